@@ -1,0 +1,28 @@
+// core/scene/gltf_loader.h: glTF 2.0 files to core::Scene.
+//
+// Khronos Group, "glTF 2.0 Specification", 2021, as far as it touches a picture, with KHR_lights_punctual,
+// KHR_materials_{emissive_strength, unlit, ior, specular}, KHR_texture_transform and EXT_mesh_gpu_instancing.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/scene/scene.h"
+
+namespace core {
+
+struct LoadOptions {
+    /// Name or number of the glTF scene; empty: the file's `scene`, or scene 0.
+    std::string scene;
+    /// Lets URIs leave the file's folder.
+    bool allow_external = false;
+};
+
+/// Reads a .gltf or .glb. Points and lines are skipped with a warning; skins are ignored with a warning.
+/// Meshes whose primitives use the same accessors become one Mesh with many instances.
+/// @throws InputError naming file and element for anything that is missing, out of range, malformed or needs
+/// an unknown required extension.
+Scene load_gltf(const std::filesystem::path& path, const LoadOptions& options = {});
+
+}  // namespace core

@@ -1,0 +1,58 @@
+// core/scene/sky.h: light from infinitely far away: nothing, a constant, or a latitude-longitude picture.
+#pragma once
+
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/image/image.h"
+
+namespace core {
+
+/// Radiance by direction, with importance sampling. Immutable once built; thread-safe.
+///
+/// Mapping of a picture: +Y is the top row; the middle column looks along -Z, u grows towards +X
+/// (so the picture is seen from inside with east to the right); `rotation` turns it about +Y.
+class Sky {
+public:
+    /// Black.
+    Sky() = default;
+
+    /// The same radiance from everywhere, cd/m^2. @pre finite, >= 0
+    static Sky constant(const glm::vec3& radiance);
+
+    /// @param image beauty in R, G, B, cd/m^2. @throws InputError for negative or non-finite texels, by name.
+    static Sky latitude_longitude(const Image& image, float rotation, const std::string& name);
+
+    /// Reads a .hdr or .exr. @throws InputError
+    static Sky read(const std::filesystem::path& path, float rotation);
+
+    bool black() const { return black_; }
+
+    /// Radiance from `direction` (unit), bilinear between texels.
+    glm::vec3 radiance(const glm::vec3& direction) const;
+
+    struct Sample {
+        glm::vec3 direction{0.0f};
+        glm::vec3 radiance{0.0f};
+        float pdf = 0.0f;  ///< Per steradian; 0: no sample.
+    };
+    /// A direction with a pdf that follows the luminance; positive wherever radiance() is.
+    Sample sample(const glm::vec2& u) const;
+    float pdf(const glm::vec3& direction) const;
+
+    /// Mean luminance over the sphere, cd/m^2.
+    float mean_luminance() const { return mean_luminance_; }
+
+private:
+    struct Map;  // The texels and their distribution.
+
+    bool black_ = true;
+    glm::vec3 constant_{0.0f};
+    float mean_luminance_ = 0.0f;
+    std::shared_ptr<const Map> map_;
+};
+
+}  // namespace core
