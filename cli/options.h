@@ -13,12 +13,11 @@ namespace cli {
 
 /// Flags that every verb takes.
 struct CommonOptions {
-    bool json = false;             ///< One JSON object on stdout.
-    bool quiet = false;            ///< Nothing on stderr but errors.
-    std::uint64_t seed = 0;        ///< Of all random numbers.
-    int threads = 0;               ///< 0: one a core.
-    std::uint64_t max_memory = 0;  ///< Bytes; 0: no limit.
-    bool allow_external = false;   ///< glTF URIs may leave the scene's folder.
+    bool json = false;            ///< One JSON object on stdout.
+    bool quiet = false;           ///< Nothing on stderr but errors.
+    std::uint64_t seed = 0;       ///< Of all random numbers.
+    int threads = 0;              ///< 0: one a core.
+    bool allow_external = false;  ///< glTF URIs may leave the scene's folder.
 };
 
 /// State of one run of the program.
@@ -44,6 +43,12 @@ core::Progress make_progress(const Program& program);
 
 /// Polled by long loops; true after SIGINT or SIGTERM.
 core::StopRequested stop_flag();
+
+/// The exit code of a signal that asked for the stop: 130 for SIGINT, 143 for SIGTERM.
+int stop_exit_code();
+
+/// Catches SIGINT and SIGTERM, so that stop_flag() sees them. A second one ends the program at once.
+void install_signal_handlers();
 
 // The verbs. Each declares its flags and help on `app` and runs from CLI11's callback.
 void add_bake_command(CLI::App& app, Program& program);

@@ -30,4 +30,10 @@ private:
     ErrorKind kind_;
 };
 
+/// Thrown by long work that was asked to stop (SIGINT, SIGTERM). Nothing was written.
+class Interrupted : public std::runtime_error {
+public:
+    Interrupted() : std::runtime_error("interrupted") {}
+};
+
 }  // namespace core

@@ -52,6 +52,10 @@ SurfacePoint surface_at(const Scene& scene, const Ray& ray, const Hit& hit);
 bool is_visible(const Scene& scene, std::uint32_t instance, std::uint32_t triangle,
                 const glm::vec2& barycentrics, std::uint32_t seed);
 
+/// Whether is_visible() may say no anywhere on one part of an instance: MASK and BLEND materials whose alpha
+/// is not a constant that always shows.
+bool may_be_invisible(const Scene& scene, std::uint32_t instance, std::uint32_t part);
+
 /// Whether any instance has a material that is_visible() may say no to.
 bool has_alpha(const Scene& scene);
 

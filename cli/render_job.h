@@ -1,0 +1,48 @@
+// cli/render_job.h: one picture from start to file: load, bake, build, render, write, account.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "cli/scene_setup.h"
+#include "core/image/tonemap.h"
+#include "core/render/renderer.h"
+#include "sdf/baker.h"
+
+namespace cli {
+
+enum class TracerKind { kSdf, kTriangle };
+const char* name_of(TracerKind kind);
+
+/// What `fieldlight render` was asked for.
+struct RenderOptions {
+    SceneOptions scene;
+    std::filesystem::path output;
+    TracerKind tracer = TracerKind::kSdf;
+    TracerKind primary = TracerKind::kTriangle;
+    int width = 1280;
+    int height = 720;
+    core::Crop crop;
+    int samples_per_pixel = 64;
+    int bounces = -1;  ///< -1: no limit.
+    double time_budget_seconds = 0.0;
+    std::set<std::string> aovs;
+    sdf::BakeSettings bake;
+    std::filesystem::path bake_folder;  ///< Empty: `SCENE.bake` beside the output.
+    bool half = false;
+    bool png = false;
+    std::optional<float> exposure;  ///< EV100; nothing: automatic.
+    core::ToneMap tone_map = core::ToneMap::kAces;
+    std::filesystem::path stats;
+};
+
+/// Renders and writes everything that was promised. Returns the object of `--stats`.
+/// @throws core::InputError, core::Interrupted; std::runtime_error if a pixel is not finite (nothing is
+/// written then).
+nlohmann::json run_render(const Program& program, const RenderOptions& options);
+
+}  // namespace cli

@@ -1,0 +1,71 @@
+// core/scene/gltf_document.h: a glTF file taken apart: its JSON, its buffers, and what the loader has to say.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/scene/gltf_json.h"
+
+namespace core {
+
+/// The parsed file. Everything the other gltf_* units read goes through it.
+class GltfDocument {
+public:
+    /// Reads a .gltf or .glb (told apart by content) and all its buffers, and checks `asset`, the required
+    /// extensions and the buffer views. @throws InputError
+    GltfDocument(const std::filesystem::path& path, bool allow_external);
+    ~GltfDocument();
+    GltfDocument(const GltfDocument&) = delete;
+    GltfDocument& operator=(const GltfDocument&) = delete;
+
+    const std::string& file_name() const { return file_name_; }
+    JsonElement root() const;
+
+    /// Length of a top-level array such as "meshes"; 0 where it is absent.
+    std::size_t count(const char* array) const;
+    /// @pre index < count(array)
+    JsonElement element(const char* array, std::size_t index) const;
+
+    /// The bytes of a buffer view, in range of its buffer, and its stride (0: tightly packed).
+    struct BufferView {
+        std::span<const std::uint8_t> bytes;
+        std::size_t stride = 0;
+    };
+    BufferView buffer_view(std::size_t index) const;
+
+    /// The still encoded bytes of an image, from its URI or buffer view.
+    std::vector<std::uint8_t> read_image(std::size_t index) const;
+
+    /// Says something once, however often it is met.
+    void warn_once(const std::string& warning);
+    const std::vector<std::string>& warnings() const { return warnings_; }
+
+    /// Counts memory that decoding takes, so that a small file that refers to the same data over and over
+    /// cannot ask for any amount. @throws InputError (kOutOfMemory) past a multiple of the file's size.
+    void charge_memory(std::size_t count, std::size_t bytes_each, const JsonElement& element);
+
+private:
+    std::string read_json_text(std::vector<std::uint8_t>& file);
+    void check_asset() const;
+    void check_extensions();
+    void load_buffers(std::optional<std::vector<std::uint8_t>> binary_chunk);
+
+    std::filesystem::path path_;
+    std::string file_name_;
+    bool allow_external_;
+    std::unique_ptr<nlohmann::json> json_;
+    std::optional<std::vector<std::uint8_t>> binary_chunk_;
+    std::vector<std::vector<std::uint8_t>> buffers_;
+    std::vector<std::string> warnings_;
+    std::uint64_t memory_limit_ = 0;
+    std::uint64_t memory_charged_ = 0;
+};
+
+}  // namespace core

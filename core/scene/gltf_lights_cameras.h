@@ -1,0 +1,21 @@
+// core/scene/gltf_lights_cameras.h: glTF cameras and KHR_lights_punctual, placed by their nodes.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "core/scene/camera.h"
+#include "core/scene/gltf_document.h"
+#include "core/scene/light.h"
+
+namespace core {
+
+/// A camera at a node, without the node's scale. It is named after the node, or else after the camera.
+/// @throws InputError for a field of view or magnification that shows nothing.
+Camera read_camera(const JsonElement& camera, const JsonElement& node, const glm::dmat4& world_from_node);
+
+/// The light that a node's KHR_lights_punctual refers to. It shines along the node's -Z.
+/// @throws InputError for an unknown type, negative intensity, cones out of order.
+Light read_light(const GltfDocument& document, const JsonElement& reference, const JsonElement& node,
+                 const glm::dmat4& world_from_node);
+
+}  // namespace core

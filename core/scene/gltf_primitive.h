@@ -1,0 +1,60 @@
+// core/scene/gltf_primitive.h: one glTF primitive to triangles with complete vertices.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/scene/gltf_document.h"
+
+namespace core {
+
+inline constexpr std::size_t kNoAccessor = std::numeric_limits<std::size_t>::max();
+
+/// The displacements of one morph target, as accessor indices.
+struct MorphTarget {
+    std::size_t position = kNoAccessor;
+    std::size_t normal = kNoAccessor;
+    std::size_t tangent = kNoAccessor;
+    auto operator<=>(const MorphTarget&) const = default;
+};
+
+/// Which accessors a primitive's geometry is made of. Equal sources give equal triangles.
+struct PrimitiveSource {
+    std::uint64_t mode = 4;
+    std::size_t indices = kNoAccessor;
+    std::size_t position = kNoAccessor;
+    std::size_t normal = kNoAccessor;
+    std::size_t tangent = kNoAccessor;
+    std::array<std::size_t, 2> uvs = {kNoAccessor, kNoAccessor};
+    std::size_t color = kNoAccessor;
+    std::vector<MorphTarget> targets;
+    auto operator<=>(const PrimitiveSource&) const = default;
+};
+
+/// Triangles and their vertices. Arrays are as long as `positions` or empty.
+struct PrimitiveGeometry {
+    std::vector<glm::vec3> positions;
+    std::vector<glm::vec3> normals;  ///< Never empty; unit.
+    std::vector<glm::vec4> tangents;
+    std::array<std::vector<glm::vec2>, 2> uvs;
+    std::vector<glm::vec4> colors;
+    std::vector<glm::uvec3> triangles;
+};
+
+/// Reads the accessor indices of a primitive that draws triangles.
+PrimitiveSource read_primitive_source(const GltfDocument& document, const JsonElement& primitive);
+
+/// Decodes a primitive.
+/// @param element of the primitive, for messages. @param weights of the morph targets; missing ones are 0.
+/// @param tangent_uv_set texture coordinates that tangents follow; negative: no tangents.
+/// @throws InputError for indices out of range, positions that are not finite, attributes of unequal length.
+PrimitiveGeometry decode_primitive(GltfDocument& document, const JsonElement& element,
+                                   const PrimitiveSource& source, const std::vector<double>& weights,
+                                   int tangent_uv_set);
+
+}  // namespace core

@@ -1,0 +1,31 @@
+// core/scene/gltf_uri.h: what a glTF file's URIs stand for: data within the text, or a file beside it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace core {
+
+/// Reads a whole regular file.
+/// @throws InputError kNoInput if it is missing or unreadable, kBadData if it is a folder, pipe or device.
+std::vector<std::uint8_t> read_whole_file(const std::filesystem::path& path, const std::string& what);
+
+/// %XX decoded (RFC 3986, section 2.1); a % that starts no such triple stands for itself.
+std::string percent_decoded(std::string_view text);
+
+/// The bytes of standard base64 (RFC 4648, section 4), or nothing if it is malformed. Padding may be missing.
+std::optional<std::vector<std::uint8_t>> base64_decoded(std::string_view text);
+
+/// The bytes behind a URI of a glTF file.
+/// @param folder the glTF file's own. @param what names the element in messages.
+/// @param allow_external lets paths be absolute, hold `..`, or lead out of the folder through links. Pipes,
+/// devices and the network are refused even then.
+/// @throws InputError
+std::vector<std::uint8_t> read_uri(const std::string& uri, const std::filesystem::path& folder,
+                                   bool allow_external, const std::string& what);
+
+}  // namespace core

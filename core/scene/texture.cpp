@@ -1,0 +1,150 @@
+#include "core/scene/texture.h"
+
+#include <fmt/format.h>
+#include <stb/stb_image.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "core/support/error.h"
+
+namespace core {
+
+namespace {
+
+constexpr std::uint64_t kMaximumTexelCount = std::uint64_t{1} << 28;
+
+/// Texels that one encoded byte can stand for at most. PNG: deflate's 1032 bytes of 8 one-bit texels. JPEG:
+/// one bit a block of 64 in each of the scans that stb reads. Headers that promise more are lies, and are
+/// refused before memory is taken.
+constexpr std::uint64_t kMaximumTexelsPerByte = 8 * 1032;
+constexpr std::uint64_t kMaximumTexelsPerJpegByte = 1024;
+
+bool starts_with(std::span<const std::uint8_t> bytes, std::initializer_list<std::uint8_t> prefix) {
+    return bytes.size() >= prefix.size() && std::equal(prefix.begin(), prefix.end(), bytes.begin());
+}
+
+[[noreturn]] void refuse(const std::string& name, const std::string& reason) {
+    throw InputError(ErrorKind::kBadData, fmt::format("image '{}': {}", name, reason));
+}
+
+std::array<float, 256> make_srgb_table() {
+    std::array<float, 256> table{};
+    for (int code = 0; code < 256; ++code) {
+        const double encoded = code / 255.0;
+        const double linear = encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+        table[code] = static_cast<float>(linear);
+    }
+    return table;
+}
+
+std::array<float, 256> make_linear_table() {
+    std::array<float, 256> table{};
+    for (int code = 0; code < 256; ++code) table[code] = static_cast<float>(code / 255.0);
+    return table;
+}
+
+const std::array<float, 256> kLinearFromSrgb = make_srgb_table();
+const std::array<float, 256> kUnitFromByte = make_linear_table();
+
+/// The coordinate brought to one period ([0, 1], or [0, 2] where mirrored), so that products with the size
+/// stay exact and in range of int.
+float wrap_coordinate(float u, TextureWrap wrap) {
+    if (!std::isfinite(u)) return 0.0f;
+    switch (wrap) {
+        case TextureWrap::kRepeat:
+            return u - std::floor(u);
+        case TextureWrap::kClampToEdge:
+            return std::clamp(u, 0.0f, 1.0f);
+        case TextureWrap::kMirroredRepeat:
+            break;
+    }
+    return u - 2.0f * std::floor(0.5f * u);
+}
+
+/// A texel index at most one period off, brought into [0, size).
+int wrap_index(int index, int size, TextureWrap wrap) {
+    switch (wrap) {
+        case TextureWrap::kRepeat:
+            if (index < 0) return index + size;
+            return index >= size ? index - size : index;
+        case TextureWrap::kClampToEdge:
+            return std::clamp(index, 0, size - 1);
+        case TextureWrap::kMirroredRepeat:
+            break;
+    }
+    if (index < 0) return -1 - index;
+    if (index >= 2 * size) return index - 2 * size;
+    return index >= size ? 2 * size - 1 - index : index;
+}
+
+glm::vec4 texel(const TextureImage& image, int x, int y, const std::array<float, 256>& color_table) {
+    const std::uint8_t* rgba = &image.rgba[4 * (static_cast<std::size_t>(y) * image.width + x)];
+    return {color_table[rgba[0]], color_table[rgba[1]], color_table[rgba[2]], kUnitFromByte[rgba[3]]};
+}
+
+}  // namespace
+
+TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const std::string& name) {
+    const bool png = starts_with(encoded, {0x89, 'P', 'N', 'G'});
+    const bool jpeg = starts_with(encoded, {0xff, 0xd8, 0xff});
+    if (!png && !jpeg) refuse(name, "is neither PNG nor JPEG, the two formats of glTF");
+    if (encoded.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
+        refuse(name, "holds more than 2^31 bytes");
+    }
+    const int byte_count = static_cast<int>(encoded.size());
+    int width = 0;
+    int height = 0;
+    int channel_count = 0;
+    if (!stbi_info_from_memory(encoded.data(), byte_count, &width, &height, &channel_count) || width <= 0 ||
+        height <= 0) {
+        refuse(name, "has no readable PNG or JPEG header");
+    }
+    const std::uint64_t texel_count = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+    const std::uint64_t plausible =
+        encoded.size() * (png ? kMaximumTexelsPerByte : kMaximumTexelsPerJpegByte);
+    if (texel_count > kMaximumTexelCount) {
+        refuse(name, fmt::format("is {} x {} texels; at most 2^28 in all are read", width, height));
+    }
+    if (texel_count > plausible) {
+        refuse(name, fmt::format("claims {} x {} texels in {} bytes; the file is damaged", width, height,
+                                 encoded.size()));
+    }
+    const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+        stbi_load_from_memory(encoded.data(), byte_count, &width, &height, &channel_count, 4),
+        stbi_image_free);
+    if (!pixels) refuse(name, fmt::format("cannot be decoded ({})", stbi_failure_reason()));
+
+    TextureImage image;
+    image.name = name;
+    image.width = width;
+    image.height = height;
+    image.rgba.assign(pixels.get(), pixels.get() + 4 * texel_count);
+    return image;
+}
+
+glm::vec4 sample_texture(const Texture& texture, const TextureImage& image, const glm::vec2& uv, bool srgb) {
+    const std::array<float, 256>& table = srgb ? kLinearFromSrgb : kUnitFromByte;
+    const float x = wrap_coordinate(uv.x, texture.wrap_u) * static_cast<float>(image.width);
+    const float y = wrap_coordinate(uv.y, texture.wrap_v) * static_cast<float>(image.height);
+    if (texture.nearest) {
+        return texel(image, wrap_index(static_cast<int>(x), image.width, texture.wrap_u),
+                     wrap_index(static_cast<int>(y), image.height, texture.wrap_v), table);
+    }
+    const float left = std::floor(x - 0.5f);
+    const float top = std::floor(y - 0.5f);
+    const float fx = x - 0.5f - left;
+    const float fy = y - 0.5f - top;
+    const int x0 = wrap_index(static_cast<int>(left), image.width, texture.wrap_u);
+    const int x1 = wrap_index(static_cast<int>(left) + 1, image.width, texture.wrap_u);
+    const int y0 = wrap_index(static_cast<int>(top), image.height, texture.wrap_v);
+    const int y1 = wrap_index(static_cast<int>(top) + 1, image.height, texture.wrap_v);
+    const glm::vec4 upper = (1.0f - fx) * texel(image, x0, y0, table) + fx * texel(image, x1, y0, table);
+    const glm::vec4 lower = (1.0f - fx) * texel(image, x0, y1, table) + fx * texel(image, x1, y1, table);
+    return (1.0f - fy) * upper + fy * lower;
+}
+
+}  // namespace core

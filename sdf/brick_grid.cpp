@@ -1,0 +1,176 @@
+#include "sdf/brick_grid.h"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <limits>
+
+#include "core/support/parallel.h"
+#include "sdf/band.h"
+
+namespace sdf {
+
+namespace {
+
+using LeafMask = std::bitset<kLeafSize>;
+
+/// Cells, named by their lowest corner, that hold a zero crossing: all corners known and not of one sign.
+LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf) {
+    LeafMask occupied;
+    for (int i = 0; i < kLeafSize; ++i) {
+        if (!leaf.is_active(i)) continue;
+        const glm::ivec3 cell(i / 64, i / 8 % 8, i % 8);
+        int negative = 0;
+        bool is_known = true;
+        for (int corner = 0; corner < 8 && is_known; ++corner) {
+            const glm::ivec3 local = cell + glm::ivec3(corner >> 2 & 1, corner >> 1 & 1, corner & 1);
+            float value = 0.0f;
+            if (local.x < kLeafSide && local.y < kLeafSide && local.z < kLeafSide) {
+                const int index = FieldLeaf::index(local.x, local.y, local.z);
+                is_known = leaf.is_active(index);
+                value = leaf.distance[static_cast<std::size_t>(index)];
+            } else {
+                const float* sample = map.value(leaf.origin + local);
+                is_known = sample != nullptr;
+                if (sample) value = *sample;
+            }
+            negative += value < 0.0f;
+        }
+        occupied[static_cast<std::size_t>(i)] = is_known && negative > 0 && negative < 8;
+    }
+    return occupied;
+}
+
+/// Squared distance, in blocks, between two boxes of one block whose numbers differ by `offset` along an
+/// axis.
+std::int64_t gap_squared(int offset) {
+    const std::int64_t gap = std::max(std::abs(offset) - 1, 0);
+    return gap * gap;
+}
+
+}  // namespace
+
+BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), inflated_(field.inflated) {
+    const LeafMap map(field.leaves);
+    std::vector<LeafMask> occupied(field.leaves.size());
+    core::parallel_for(field.leaves.size(), 8, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) occupied[i] = occupied_cells(map, field.leaves[i]);
+    });
+
+    core::BasicBounds<glm::dvec3> cells;
+    for (std::size_t i = 0; i < occupied.size(); ++i) {
+        if (occupied[i].none()) continue;
+        for (int cell = 0; cell < kLeafSize; ++cell) {
+            if (!occupied[i][static_cast<std::size_t>(cell)]) continue;
+            cells.include(
+                glm::dvec3(field.leaves[i].origin + glm::ivec3(cell / 64, cell / 8 % 8, cell % 8)));
+        }
+    }
+    if (cells.empty()) return;
+    const glm::ivec3 first(cells.minimum);
+    occupied_voxels_.include(glm::dvec3(0.0));
+    occupied_voxels_.include(cells.maximum - cells.minimum + 1.0);
+    origin_ = info_.origin + info_.voxel_size * glm::dvec3(first);
+    block_count_ = glm::ivec3(cells.maximum - cells.minimum) / kBrickCells + 1;
+    top_.assign(static_cast<std::size_t>(block_count_.x) * block_count_.y * block_count_.z, -1);
+
+    std::vector<glm::ivec3> blocks;
+    for (std::size_t i = 0; i < occupied.size(); ++i) {
+        if (occupied[i].none()) continue;
+        for (int cell = 0; cell < kLeafSize; ++cell) {
+            if (!occupied[i][static_cast<std::size_t>(cell)]) continue;
+            const glm::ivec3 position =
+                field.leaves[i].origin + glm::ivec3(cell / 64, cell / 8 % 8, cell % 8) - first;
+            const glm::ivec3 block = position / kBrickCells;
+            std::int32_t& entry = top_[block_index(block)];
+            if (entry < 0) {
+                entry = static_cast<std::int32_t>(blocks.size());
+                blocks.push_back(block);
+                bricks_.emplace_back();
+                bricks_.back().occupied.fill(0);
+            }
+            const glm::ivec3 local = position - block * kBrickCells;
+            bricks_[static_cast<std::size_t>(entry)].occupied[static_cast<std::size_t>(local.x)] |=
+                std::uint64_t{1} << (kBrickCells * local.y + local.z);
+        }
+    }
+    core::parallel_for(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t number = begin; number < end; ++number) {
+            Brick& brick = bricks_[number];
+            const glm::ivec3 base = first + blocks[number] * kBrickCells;
+            for (int i = 0; i < kLeafSize; ++i) {
+                const glm::ivec3 sample = base + glm::ivec3(i / 64, i / 8 % 8, i % 8);
+                const FieldLeaf* leaf = map.find(sample);
+                const int slot = LeafMap::offset_in_leaf(sample);
+                const bool is_known = leaf && leaf->is_active(slot);
+                brick.distance[static_cast<std::size_t>(i)] =
+                    is_known ? static_cast<float>(leaf->distance[static_cast<std::size_t>(slot)] /
+                                                  info_.voxel_size)
+                             : kBandVoxels;
+                brick.triangle[static_cast<std::size_t>(i)] =
+                    is_known ? leaf->triangle[static_cast<std::size_t>(slot)] : -1;
+            }
+        }
+    });
+    fill_empty_distances();
+}
+
+void BrickGrid::fill_empty_distances() {
+    // An exact distance transform over blocks, axis by axis: squared gaps between boxes add up over axes.
+    constexpr std::int64_t kFar = std::numeric_limits<std::int32_t>::max();
+    const glm::ivec3 count = block_count_;
+    std::vector<std::int64_t> squared(top_.size());
+    for (std::size_t i = 0; i < top_.size(); ++i) squared[i] = top_[i] >= 0 ? 0 : kFar;
+    for (int axis = 2; axis >= 0; --axis) {
+        const int length = count[axis];
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        core::parallel_for(static_cast<std::size_t>(count[u]), 4, [&](std::size_t begin, std::size_t end) {
+            std::vector<std::int64_t> line(static_cast<std::size_t>(length));
+            for (std::size_t row = begin; row < end; ++row) {
+                for (int column = 0; column < count[v]; ++column) {
+                    glm::ivec3 block(0);
+                    block[u] = static_cast<int>(row);
+                    block[v] = column;
+                    for (int i = 0; i < length; ++i) {
+                        block[axis] = i;
+                        line[static_cast<std::size_t>(i)] = squared[block_index(block)];
+                    }
+                    for (int i = 0; i < length; ++i) {
+                        std::int64_t best = line[static_cast<std::size_t>(i)];
+                        for (int offset = 1; offset < length && gap_squared(offset) < best; ++offset) {
+                            const std::int64_t gap = gap_squared(offset);
+                            if (i >= offset) {
+                                best = std::min(best, gap + line[static_cast<std::size_t>(i - offset)]);
+                            }
+                            if (i + offset < length) {
+                                best = std::min(best, gap + line[static_cast<std::size_t>(i + offset)]);
+                            }
+                        }
+                        block[axis] = i;
+                        squared[block_index(block)] = best;
+                    }
+                }
+            }
+        });
+    }
+    for (std::size_t i = 0; i < top_.size(); ++i) {
+        if (top_[i] >= 0) continue;
+        const double voxels = kBrickCells * std::sqrt(static_cast<double>(squared[i]));
+        top_[i] = -1 - static_cast<std::int32_t>(std::floor(voxels * (1.0 - 1e-12) / kDistanceStep));
+    }
+}
+
+core::DoubleBounds BrickGrid::local_bounds() const {
+    core::DoubleBounds result;
+    if (occupied_voxels_.empty()) return result;
+    result.include(origin_ + info_.voxel_size * occupied_voxels_.minimum);
+    result.include(origin_ + info_.voxel_size * occupied_voxels_.maximum);
+    return result;
+}
+
+std::size_t BrickGrid::bytes() const {
+    return sizeof(*this) + top_.capacity() * sizeof(top_[0]) + bricks_.capacity() * sizeof(Brick) +
+           inflated_.capacity();
+}
+
+}  // namespace sdf

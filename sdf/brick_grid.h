@@ -1,0 +1,91 @@
+// sdf/brick_grid.h: the field as the tracer walks it: bricks of samples, occupied cells, safe steps between.
+//
+// Space is cut into blocks of 7^3 cells. A block that holds a piece of the surface has a brick of 8^3
+// samples, a mask of the cells that hold a zero crossing, and each sample's closest triangle. Every other
+// block holds a lower bound of the distance to the nearest occupied cell, which is rigorous for the trilinear
+// surface whatever the interpolation error (raw samples are not).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <vector>
+
+#include "core/math/bounds.h"
+#include "sdf/sampled_field.h"
+
+namespace sdf {
+
+/// Cells, and samples, along one side of a brick.
+inline constexpr int kBrickCells = 7;
+inline constexpr int kBrickSamples = kBrickCells + 1;
+
+/// 8^3 samples in voxels, negative inside; x runs slowest, z fastest.
+struct Brick {
+    std::array<float, kBrickSamples * kBrickSamples * kBrickSamples> distance;
+    std::array<std::int32_t, kBrickSamples * kBrickSamples * kBrickSamples> triangle;
+    /// One word an x-layer of cells, bit 7 y + z: the cell holds a zero crossing.
+    std::array<std::uint64_t, kBrickCells> occupied;
+
+    static constexpr int index(int x, int y, int z) { return (x * kBrickSamples + y) * kBrickSamples + z; }
+    bool is_occupied(int x, int y, int z) const { return (occupied[x] >> (kBrickCells * y + z)) & 1; }
+};
+
+/// An immutable field ready for tracing. Voxel coordinates: sample (i, j, k) lies at (i, j, k), and block
+/// (0, 0, 0) starts at 0; all coordinates inside the grid are >= 0.
+class BrickGrid {
+public:
+    /// Lays out a baked field.
+    explicit BrickGrid(const SampledField& field);
+
+    const FieldInfo& info() const { return info_; }
+    double voxel_size() const { return info_.voxel_size; }
+    /// Local position of voxel coordinate (0, 0, 0).
+    const glm::dvec3& origin() const { return origin_; }
+    const glm::ivec3& block_count() const { return block_count_; }
+
+    /// Box round all occupied cells, in voxels; empty if the field has no surface.
+    const core::DoubleBounds& occupied_voxels() const { return occupied_voxels_; }
+    /// The same in local units.
+    core::DoubleBounds local_bounds() const;
+
+    /// The block's brick, or nothing where it is empty. @pre coordinates in range
+    const Brick* brick(const glm::ivec3& block) const {
+        const std::int32_t entry = top_[block_index(block)];
+        return entry >= 0 ? &bricks_[static_cast<std::size_t>(entry)] : nullptr;
+    }
+    /// Entry of the top grid: a brick number if >= 0, else see empty_distance().
+    std::int32_t entry(const glm::ivec3& block) const { return top_[block_index(block)]; }
+    const Brick& brick_at(std::int32_t entry) const { return bricks_[static_cast<std::size_t>(entry)]; }
+    /// Voxels from anywhere in an empty block to the nearest occupied cell, rounded down.
+    static double empty_distance(std::int32_t entry) { return -(entry + 1) * kDistanceStep; }
+
+    /// Whether the triangle is represented with the half-thickness.
+    bool is_inflated(std::uint32_t triangle) const { return !inflated_.empty() && inflated_[triangle] != 0; }
+    /// tau in voxels; 0 where nothing is inflated.
+    double half_thickness_voxels() const { return info_.half_thickness / info_.voxel_size; }
+
+    std::size_t brick_count() const { return bricks_.size(); }
+    /// Memory held.
+    std::size_t bytes() const;
+
+private:
+    static constexpr double kDistanceStep = 1.0 / 64.0;
+
+    std::size_t block_index(const glm::ivec3& block) const {
+        return (static_cast<std::size_t>(block.x) * block_count_.y + block.y) * block_count_.z + block.z;
+    }
+    void fill_empty_distances();
+
+    FieldInfo info_;
+    glm::dvec3 origin_{0.0};
+    glm::ivec3 block_count_{0};
+    core::DoubleBounds occupied_voxels_;
+    std::vector<std::int32_t> top_;
+    std::vector<Brick> bricks_;
+    std::vector<std::uint8_t> inflated_;
+};
+
+}  // namespace sdf

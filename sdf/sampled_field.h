@@ -1,0 +1,81 @@
+// sdf/sampled_field.h: one mesh's baked field as plain data: what a .vdb file holds, without OpenVDB.
+//
+// Samples lie on the lattice p = origin + voxel_size * ijk of the mesh's local space, in leaves of 8^3. Only
+// a narrow band round the surface is stored ("active" samples); elsewhere the field is +-background.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace sdf {
+
+/// Samples along one side of a leaf.
+inline constexpr int kLeafSide = 8;
+inline constexpr int kLeafSize = kLeafSide * kLeafSide * kLeafSide;
+
+/// Half-width of the stored band, in voxels; also the background value.
+inline constexpr float kBandVoxels = 4.0f;
+
+/// Half the thickness that a sheet (or a solid too thin for the lattice) is given, in voxels: with at least
+/// 0.50 a sheet is ray-tight in every orientation under trilinear sampling.
+inline constexpr double kHalfThicknessVoxels = 0.55;
+
+/// What the components of a mesh turned out to be.
+enum class MeshClass : std::uint8_t {
+    kSolid,  ///< Every component encloses a volume: signed distance.
+    kSheet,  ///< None does: distance minus a half-thickness.
+    kMixed,
+};
+
+/// "solid", "sheet" or "mixed", as reports and metadata spell it.
+std::string_view class_name(MeshClass value);
+
+/// Distances between the mesh and the trilinear surface of its field, in voxels, over area-uniform samples.
+struct ErrorFigures {
+    double mean = 0.0;
+    double p99 = 0.0;
+    double max = 0.0;
+};
+
+/// What is known of a baked field besides its samples; the .vdb's metadata.
+struct FieldInfo {
+    MeshClass mesh_class = MeshClass::kSolid;
+    double voxel_size = 0.0;        ///< h, local units.
+    glm::dvec3 origin{0.0};         ///< Local position of lattice point (0, 0, 0).
+    double half_thickness = 0.0;    ///< tau, local units; 0 where nothing is inflated.
+    bool clean_level_set = false;   ///< Closed, signed, nothing inflated: a level set in OpenVDB's sense.
+    std::uint32_t triangle_count = 0;  ///< Of the source mesh.
+    std::uint32_t dropped_faces = 0;   ///< Faces the bake could not use.
+    ErrorFigures error_voxels;         ///< Mesh -> field; on inflated features beyond the half-thickness.
+    std::string source_hash;           ///< Of the mesh's geometry.
+    std::string settings_hash;         ///< Of everything else that decides the samples.
+    std::vector<std::string> warnings;
+};
+
+/// 8^3 samples; x runs slowest, z fastest, as in OpenVDB's leaves.
+struct FieldLeaf {
+    glm::ivec3 origin{0};  ///< Lattice coordinates of the first sample, multiples of 8.
+    std::array<float, kLeafSize> distance{};         ///< Local units, negative inside.
+    std::array<std::int32_t, kLeafSize> triangle{};  ///< Closest source triangle; -1 where inactive.
+    std::array<std::uint64_t, kLeafSize / 64> active{};
+
+    static int index(int x, int y, int z) { return (x * kLeafSide + y) * kLeafSide + z; }
+    bool is_active(int i) const { return (active[i / 64] >> (i % 64)) & 1; }
+    void set_active(int i) { active[i / 64] |= std::uint64_t{1} << (i % 64); }
+};
+
+/// A baked mesh.
+struct SampledField {
+    FieldInfo info;
+    std::vector<FieldLeaf> leaves;  ///< Sorted by origin (x, then y, then z).
+    /// One entry a source triangle: 1 where it is represented with the half-thickness.
+    std::vector<std::uint8_t> inflated;
+
+    float background() const { return static_cast<float>(kBandVoxels * info.voxel_size); }
+};
+
+}  // namespace sdf

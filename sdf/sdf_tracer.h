@@ -1,0 +1,76 @@
+// sdf/sdf_tracer.h: core::Tracer over baked distance fields.
+//
+// The ray is transformed and not the field: o' = M^-1 o, d' = M^-1 d, unnormalised, so that t is shared by
+// all instances and by the triangle tracer, and scale, shear and mirrors are exact.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "core/trace/tracer.h"
+#include "sdf/brick_grid.h"
+#include "sdf/instance_tree.h"
+
+namespace sdf {
+
+/// Finds hits by walking the fields of all instances front to back. Hits lie on the exact surface of the
+/// trilinear field; triangle and barycentrics are the closest point of the closest stored triangle.
+class SdfTracer : public core::Tracer {
+public:
+    /// Work done since construction, over all threads.
+    struct Statistics {
+        std::uint64_t rays = 0;
+        std::uint64_t steps = 0;      ///< Cells and empty blocks visited.
+        std::uint64_t exhausted = 0;  ///< Rays that ran into the step cap.
+    };
+
+    /// @param scene must outlive the tracer.
+    /// @param grids by mesh index; instances of a mesh without a grid are not there for rays.
+    /// @pre grids.size() == scene.meshes.size()
+    SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids);
+
+    void trace_closest(const core::RayStream& rays, core::HitStream& hits) const override;
+    void trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const override;
+
+    /// The largest distance measured at the bake between mesh and field surface, half-thickness included.
+    float start_offset(std::uint32_t instance) const override;
+
+    Statistics statistics() const;
+
+    /// Memory held by grids and instances.
+    std::size_t bytes() const;
+
+private:
+    struct PlacedGrid {
+        const BrickGrid* grid = nullptr;
+        glm::dmat3 voxel_from_world_linear{1.0};  ///< Directions: world -> voxels.
+        glm::dmat4 voxel_from_world{1.0};         ///< Points: world -> voxels.
+        double largest_scale = 1.0;               ///< Largest singular value of world_from_local.
+        float start_offset = 0.0f;
+    };
+    struct Candidate;
+
+    template <bool kAnyHit>
+    core::Hit trace_one(const core::Ray& ray) const;
+    /// Looks for the first visible crossing of one instance nearer than the hit so far. Returns whether the
+    /// step cap was met.
+    bool trace_instance(const core::Ray& ray, std::uint32_t instance, core::Hit& nearest) const;
+    bool resolve(const core::Ray& ray, const Candidate& candidate, core::Hit& hit) const;
+    void count(std::uint64_t rays, std::uint64_t steps, std::uint64_t exhausted) const;
+
+    const core::Scene& scene_;
+    std::vector<std::shared_ptr<const BrickGrid>> grids_;
+    std::vector<PlacedGrid> placed_;
+    InstanceTree tree_;
+    bool has_alpha_ = false;
+    mutable std::atomic<std::uint64_t> ray_count_{0};
+    mutable std::atomic<std::uint64_t> step_count_{0};
+    mutable std::atomic<std::uint64_t> exhausted_count_{0};
+};
+
+}  // namespace sdf

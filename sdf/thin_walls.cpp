@@ -1,0 +1,111 @@
+#include "sdf/thin_walls.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/support/parallel.h"
+
+namespace sdf {
+
+namespace {
+
+/// Edges of the pieces that triangles are cut into, in voxels.
+constexpr double kPieceEdge = 1.0;
+
+/// Walls thicker than this are always held by the lattice: along any direction two voxels hold a sample
+/// whose neighbours are inside as well.
+constexpr double kSafeThickness = 2.0;
+
+/// The middle of a wall must be this far inside, in voxels. A field that only just shows the wall here may
+/// miss it half a voxel away.
+constexpr double kNeededDepth = 0.1;
+
+struct Piece {
+    Triangle triangle;
+    double thickness = 0.0;
+};
+
+void cut(const Triangle& triangle, std::vector<Piece>& pieces) {
+    const double ab = glm::distance(triangle.a, triangle.b), bc = glm::distance(triangle.b, triangle.c),
+                 ca = glm::distance(triangle.c, triangle.a);
+    const double longest = std::max({ab, bc, ca});
+    if (longest <= kPieceEdge) {
+        pieces.push_back({triangle});
+        return;
+    }
+    // Halving the longest edge keeps slivers from multiplying their thin side.
+    const glm::dvec3 &a = triangle.a, &b = triangle.b, &c = triangle.c;
+    if (longest == ab) {
+        const glm::dvec3 middle = 0.5 * (a + b);
+        cut({a, middle, c}, pieces);
+        cut({middle, b, c}, pieces);
+    } else if (longest == bc) {
+        const glm::dvec3 middle = 0.5 * (b + c);
+        cut({a, b, middle}, pieces);
+        cut({a, middle, c}, pieces);
+    } else {
+        const glm::dvec3 middle = 0.5 * (c + a);
+        cut({a, b, middle}, pieces);
+        cut({middle, b, c}, pieces);
+    }
+}
+
+}  // namespace
+
+ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vector<Component>& components,
+                          const TriangleBvh& solids, const LeafMap& field) {
+    std::vector<std::uint32_t> solid_triangles;
+    std::vector<std::uint8_t> inverted;
+    for (const Component& component : components) {
+        if (component.is_sheet) continue;
+        for (const std::uint32_t triangle : component.triangles) {
+            solid_triangles.push_back(triangle);
+            inverted.push_back(component.is_inverted);
+        }
+    }
+    std::vector<std::vector<Piece>> missing(solid_triangles.size());
+    std::vector<double> area(solid_triangles.size());
+    core::parallel_for(solid_triangles.size(), 64, [&](std::size_t begin, std::size_t end) {
+        std::vector<Piece> pieces;
+        for (std::size_t i = begin; i < end; ++i) {
+            const Triangle& triangle = corners[solid_triangles[i]];
+            const glm::dvec3 scaled = triangle.scaled_normal();
+            area[i] = 0.5 * glm::length(scaled);
+            const glm::dvec3 inward = (inverted[i] ? 1.0 : -1.0) * glm::normalize(scaled);
+            pieces.clear();
+            cut(triangle, pieces);
+            for (Piece& piece : pieces) {
+                const glm::dvec3 center = (piece.triangle.a + piece.triangle.b + piece.triangle.c) / 3.0;
+                piece.thickness = solids.nearest_crossing(center, inward, 1e-9);
+                if (!(piece.thickness < kSafeThickness)) continue;
+                double depth = 0.0;
+                if (!field.interpolate(center + 0.5 * piece.thickness * inward, depth)) continue;
+                if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness)) {
+                    missing[i].push_back(piece);
+                }
+            }
+        }
+    });
+
+    ThinWalls result;
+    std::vector<double> thicknesses;
+    double total_area = 0.0, missing_area = 0.0;
+    for (std::size_t i = 0; i < missing.size(); ++i) {
+        total_area += area[i];
+        for (const Piece& piece : missing[i]) {
+            result.pieces.push_back(piece.triangle);
+            result.triangle_of_piece.push_back(solid_triangles[i]);
+            missing_area += 0.5 * glm::length(piece.triangle.scaled_normal());
+            thicknesses.push_back(piece.thickness);
+        }
+    }
+    if (!thicknesses.empty()) {
+        const auto tenth = thicknesses.begin() + static_cast<std::ptrdiff_t>(thicknesses.size() / 10);
+        std::nth_element(thicknesses.begin(), tenth, thicknesses.end());
+        result.thickness = *tenth;
+        result.area_fraction = missing_area / total_area;
+    }
+    return result;
+}
+
+}  // namespace sdf

@@ -1,0 +1,133 @@
+#include "core/render/light_sampler.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/analytic_scenes.h"
+#include "tests/support/chi_square.h"
+#include "tests/support/render_scenes.h"
+
+namespace {
+
+/// Two emissive rectangles of different brightness, a sky and a wide sun.
+core::Scene many_lights() {
+    core::Scene scene;
+    core::Material bright = tests::lambert(glm::vec3(0.5f));
+    bright.emission = glm::vec3(4.0f);
+    core::Material dim = bright;
+    dim.emission = glm::vec3(1.0f);
+    const std::uint32_t mesh = tests::add_mesh(scene, tests::quad(1.0f, 0.6f, 3, 2));
+    const std::uint32_t first = tests::add_material(scene, bright);
+    const std::uint32_t second = tests::add_material(scene, dim);
+    tests::add_instance(scene, mesh, tests::translation({0.2, 0.1, 2.0}), first);
+    tests::add_instance(scene, mesh, tests::translation({-1.5, 0.3, 1.2}) * tests::rotation(1.0, {0, 1, 0}),
+                        second);
+    scene.sky = core::Sky::constant(glm::vec3(0.4f));
+    scene.lights.emplace_back(core::make_sun(0.6f, 0.5f, 3.0f, 0.5f));
+    return scene;
+}
+
+TEST(LightSampler, ChoosesDirectionsWithTheDensityItClaims) {
+    const core::Scene scene = many_lights();
+    const core::LightSampler sampler(scene);
+    EXPECT_EQ(sampler.group_count(), 4u);
+    const core::LightReceiver receiver{glm::vec3(0.1f, -0.2f, 0.0f),
+                                       glm::normalize(glm::vec3(0.2f, 0.1f, 1.0f))};
+    const core::LightSampler::Selection selection = sampler.selection(receiver);
+
+    // The truth about which triangle a direction meets, in double, by Cramer's rule.
+    const auto density = [&](const glm::vec3& direction) {
+        double sum = 0.0;
+        for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+            const core::Mesh& mesh = scene.meshes[scene.instances[i].mesh];
+            for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+                glm::dvec3 p[3];
+                for (int c = 0; c < 3; ++c) {
+                    p[c] = glm::dvec3(scene.instances[i].world_from_local *
+                                      glm::dvec4(mesh.positions[mesh.triangles[t][c]], 1.0));
+                }
+                const glm::dmat3 system(p[1] - p[0], p[2] - p[0], -glm::dvec3(direction));
+                if (std::abs(glm::determinant(system)) < 1e-12) continue;
+                const glm::dvec3 solution = glm::inverse(system) * (glm::dvec3(receiver.position) - p[0]);
+                if (solution.x < 0 || solution.y < 0 || solution.x + solution.y > 1 || solution.z <= 0)
+                    continue;
+                sum += static_cast<double>(sampler.emitter_pdf(receiver, selection, i, t, direction,
+                                                               static_cast<float>(solution.z)));
+            }
+        }
+        return sum;
+    };
+    // Emitters alone are compared cell by cell; sky and sun fall into the cell of samples that return
+    // nothing.
+    tests::ChiSquareSettings settings;
+    settings.integration_points = 16;
+    const double p = tests::chi_square_p_value(
+        [&](const glm::vec2& u, float u_group) -> std::optional<glm::vec3> {
+            const auto sample = sampler.sample(receiver, selection, u_group, u);
+            if (!(sample.pdf > 0.0f) || sample.instance == core::kNoIndex) return std::nullopt;
+            return sample.direction;
+        },
+        density, settings);
+    EXPECT_GT(p, 0.01);
+}
+
+TEST(LightSampler, EstimatesWhatTheUnweightedSkySends) {
+    // Irradiance from sky and sun by light sampling, against the closed form: sky pi L (the normal sees half
+    // of it), sun E cos. 1 %: 2e5 samples of a bounded integrand.
+    core::Scene scene;
+    scene.sky = core::Sky::constant(glm::vec3(0.4f));
+    scene.lights.emplace_back(core::make_sun(0.0f, core::kPi / 2.0f, 3.0f, 0.02f));
+    const core::LightSampler sampler(scene);
+    const core::LightReceiver receiver{glm::vec3(0.0f), {0, 1, 0}};
+    const auto selection = sampler.selection(receiver);
+    tests::TestRandom random(6);
+    double sum = 0.0;
+    constexpr int kCount = 200000;
+    for (int i = 0; i < kCount; ++i) {
+        const auto sample =
+            sampler.sample(receiver, selection, static_cast<float>(random.uniform() * 0.99999994),
+                           {static_cast<float>(random.uniform() * 0.99999994),
+                            static_cast<float>(random.uniform() * 0.99999994)});
+        if (sample.pdf > 0.0f && sample.direction.y > 0.0f) {
+            sum += static_cast<double>(sample.radiance.x * sample.direction.y / sample.pdf);
+        }
+    }
+    EXPECT_NEAR(sum / kCount, 0.4 * 3.14159265 + 3.0, 0.01 * (0.4 * 3.14159265 + 3.0));
+}
+
+TEST(LightSampler, GivesNoProbabilityToLightsBelowTheHorizonAndSomeToAllOthers) {
+    const core::Scene scene = many_lights();
+    const core::LightSampler sampler(scene);
+    const core::LightReceiver away{glm::vec3(0.0f), {0, 0, -1}};
+    const auto selection = sampler.selection(away);
+    tests::TestRandom random(6);
+    for (int i = 0; i < 10000; ++i) {
+        const auto sample =
+            sampler.sample(away, selection, static_cast<float>(random.uniform() * 0.99999994),
+                           {static_cast<float>(random.uniform()), static_cast<float>(random.uniform())});
+        EXPECT_EQ(sample.instance, core::kNoIndex);
+    }
+}
+
+TEST(LightSampler, WeighsEscapedLightBetweenZeroAndAllOfIt) {
+    const core::Scene scene = many_lights();
+    const core::LightSampler sampler(scene);
+    const core::LightReceiver receiver{glm::vec3(0.0f), {0, 1, 0}};
+    const auto selection = sampler.selection(receiver);
+    tests::TestRandom random(3);
+    for (int i = 0; i < 1000; ++i) {
+        const glm::vec3 direction(random.direction());
+        const float whole = sampler.escaped_radiance(direction).x;
+        const float weighted = sampler.weighted_escaped_radiance(receiver, selection, direction, 0.3f).x;
+        EXPECT_GT(weighted, 0.0f);
+        EXPECT_LE(weighted, whole);
+    }
+}
+
+TEST(LightSampler, IsEmptyInADarkScene) {
+    const core::Scene scene = tests::scene_of(tests::box());
+    EXPECT_TRUE(core::LightSampler(scene).empty());
+}
+
+}  // namespace

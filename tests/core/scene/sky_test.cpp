@@ -1,0 +1,115 @@
+#include "core/scene/sky.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/math/sampling.h"
+#include "core/support/error.h"
+#include "tests/support/analytic_scenes.h"
+#include "tests/support/chi_square.h"
+#include "tests/support/shared_data.h"
+
+namespace {
+
+core::Image picture(int width, int height, unsigned seed) {
+    tests::TestRandom random(seed);
+    std::vector<glm::vec3> colors(static_cast<std::size_t>(width * height));
+    for (glm::vec3& color : colors) {
+        color = glm::vec3(random.uniform(), random.uniform(), random.uniform());
+        if (random.uniform() < 0.3) color = glm::vec3(0.0f);
+        if (random.uniform() < 0.05) color *= 50.0f;
+    }
+    core::Image image(width, height);
+    image.add_color("", colors);
+    return image;
+}
+
+TEST(Sky, SamplesFollowTheirDensity) {
+    const core::Sky sky = core::Sky::latitude_longitude(picture(16, 8, 3), 0.7f, "test");
+    tests::ChiSquareSettings settings;
+    settings.axis = {0.0f, 1.0f, 0.0f};
+    settings.integration_points = 24;
+    EXPECT_GT(tests::chi_square_p_value(
+                  [&](const glm::vec2& u, float) -> std::optional<glm::vec3> {
+                      const core::Sky::Sample sample = sky.sample(u);
+                      if (!(sample.pdf > 0.0f)) return std::nullopt;
+                      return sample.direction;
+                  },
+                  [&](const glm::vec3& d) { return sky.pdf(d); }, settings),
+              0.01);
+}
+
+TEST(Sky, HasADensityWhereverItShines) {
+    const core::Sky sky = core::Sky::latitude_longitude(picture(32, 16, 5), 0.0f, "test");
+    tests::TestRandom random(8);
+    for (int i = 0; i < 100000; ++i) {
+        const glm::vec3 direction(random.direction());
+        if (sky.radiance(direction).x > 0.0f) EXPECT_GT(sky.pdf(direction), 0.0f);
+    }
+}
+
+TEST(Sky, EstimatesItsOwnIrradianceWithoutBias) {
+    const core::Sky sky = core::Sky::latitude_longitude(picture(16, 8, 3), 0.0f, "test");
+    double by_sampling = 0.0, by_uniform = 0.0;
+    tests::TestRandom random(2);
+    constexpr int kCount = 400000;
+    for (int i = 0; i < kCount; ++i) {
+        const glm::vec2 u(static_cast<float>(random.uniform()), static_cast<float>(random.uniform()));
+        const core::Sky::Sample sample = sky.sample(u);
+        if (sample.pdf > 0.0f) by_sampling += static_cast<double>(sample.radiance.y / sample.pdf);
+        by_uniform +=
+            static_cast<double>(sky.radiance(core::sample_uniform_sphere(u)).y / core::kUniformSpherePdf);
+    }
+    EXPECT_NEAR(by_sampling / by_uniform, 1.0, 0.01);  // Uniform sampling's own noise is 0.3 %.
+}
+
+TEST(Sky, LooksAlongMinusZInItsMiddleColumnAndTurnsWithRotation) {
+    core::Image image(8, 4);
+    std::vector<glm::vec3> colors(32, glm::vec3(0.0f));
+    colors[1 * 8 + 3] = colors[1 * 8 + 4] = colors[2 * 8 + 3] =
+        colors[2 * 8 + 4] = {1.0f, 0.0f, 0.0f};  // Middle.
+    colors[1 * 8 + 5] = colors[1 * 8 + 6] = colors[2 * 8 + 5] =
+        colors[2 * 8 + 6] = {0.0f, 1.0f, 0.0f};  // To the right.
+    for (std::size_t x = 0; x < 8; ++x) colors[x] = {0.0f, 0.0f, 1.0f};
+    image.add_color("", colors);
+    const core::Sky sky = core::Sky::latitude_longitude(image, 0.0f, "test");
+    EXPECT_FLOAT_EQ(sky.radiance({0, 0, -1}).x, 1.0f);
+    EXPECT_FLOAT_EQ(sky.radiance({1, 0, 0}).y, 1.0f);
+    EXPECT_FLOAT_EQ(sky.radiance({0, 1, 0}).z, 1.0f);
+    // A quarter turn about +Y takes -Z to -X.
+    const core::Sky turned = core::Sky::latitude_longitude(image, core::kPi / 2.0f, "test");
+    EXPECT_NEAR(turned.radiance({-1, 0, 0}).x, 1.0f, 1e-5f);
+    EXPECT_NEAR(turned.radiance({0, 0, -1}).y, 1.0f, 1e-5f);
+}
+
+TEST(Sky, RefusesTexelsThatAreNotRadiance) {
+    core::Image image(2, 1);
+    image.add_color("", {glm::vec3(1.0f), glm::vec3(0.0f, -1.0f, 0.0f)});
+    EXPECT_THROW(core::Sky::latitude_longitude(image, 0.0f, "bad"), core::InputError);
+}
+
+TEST(Sky, SurvivesOneTexelOfAHundredThousand) {
+    core::Image image(64, 32);
+    std::vector<glm::vec3> colors(64 * 32, glm::vec3(0.1f));
+    colors[700] = glm::vec3(1e5f);
+    image.add_color("", colors);
+    const core::Sky sky = core::Sky::latitude_longitude(image, 0.0f, "bright");
+    tests::TestRandom random(2);
+    for (int i = 0; i < 10000; ++i) {
+        const core::Sky::Sample sample =
+            sky.sample({static_cast<float>(random.uniform()), static_cast<float>(random.uniform())});
+        ASSERT_TRUE(std::isfinite(sample.pdf) && std::isfinite(sample.radiance.x));
+        if (sample.pdf > 0.0f) EXPECT_LT(sample.radiance.x / sample.pdf, 4e4f);
+    }
+}
+
+TEST(Sky, ReadsRealPanoramas) {
+    FIELDLIGHT_NEED_SHARED(folder, "scenes/skies");
+    const core::Sky beach = core::Sky::read(folder / "spiaggia_di_mondello_1k.hdr", 0.0f);
+    EXPECT_FALSE(beach.black());
+    EXPECT_GT(beach.radiance({0, 1, 0}).z, beach.radiance({0, 1, 0}).x) << "the sky is blue overhead";
+    EXPECT_FALSE(core::Sky::read(folder / "OrientationLatLong.exr", 0.0f).black());
+}
+
+}  // namespace
