@@ -41,8 +41,16 @@ private:
     std::vector<std::uint32_t> order_;
 };
 
-/// The part of [t_min, t_max] inside a box; false if there is none. Written with comparisons that a NaN
-/// (0 times infinity, a ray in a face) fails, so that such a ray counts as inside the slab.
+/// 1 / direction with something finite in place of infinity, so that a ray in the face of a box (0 times the
+/// inverse) counts as inside that slab and no NaN arises.
+inline glm::dvec3 finite_inverse(const glm::dvec3& direction) {
+    constexpr double kHuge = 1e200;
+    glm::dvec3 inverse;
+    for (int axis = 0; axis < 3; ++axis) inverse[axis] = direction[axis] == 0.0 ? kHuge : 1.0 / direction[axis];
+    return inverse;
+}
+
+/// Narrows [t_min, t_max] to the part inside a box; false if there is none.
 inline bool clip_to_box(const core::DoubleBounds& box, const glm::dvec3& origin,
                         const glm::dvec3& inverse_direction, double& t_min, double& t_max) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -60,7 +68,7 @@ template <typename Limit, typename Visit>
 void InstanceTree::walk(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
                         const Limit& limit, const Visit& visit) const {
     if (nodes_.empty()) return;
-    const glm::dvec3 inverse = 1.0 / direction;
+    const glm::dvec3 inverse = finite_inverse(direction);
     struct Entry {
         std::uint32_t node;
         double t;

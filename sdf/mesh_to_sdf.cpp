@@ -20,9 +20,6 @@ namespace sdf {
 
 namespace {
 
-/// Lattices beyond this are a wrong setting and not a wish.
-constexpr double kMostVoxelsAlongSide = 8192.0;
-
 constexpr int kSampleCount = kLeafSize;
 
 /// The triangles of a mesh in voxel units, by kind.
@@ -265,7 +262,7 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
     if (!(h > 0.0) || !std::isfinite(h) || !(longest / h <= kMostVoxelsAlongSide)) {
         throw core::InputError(core::ErrorKind::kBadData,
                                fmt::format("a voxel of {:g} gives {:g} voxels along its longest side; at most "
-                                           "{:g} can be baked",
+                                           "{} can be baked",
                                            h, longest / h, kMostVoxelsAlongSide));
     }
 

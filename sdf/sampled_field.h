@@ -20,6 +20,10 @@ inline constexpr int kLeafSize = kLeafSide * kLeafSide * kLeafSide;
 /// Half-width of the stored band, in voxels; also the background value.
 inline constexpr float kBandVoxels = 4.0f;
 
+/// No field spans more voxels than this along a side; its lattice coordinates lie within half of it and the
+/// band.
+inline constexpr int kMostVoxelsAlongSide = 2048;
+
 /// Half the thickness that a sheet (or a solid too thin for the lattice) is given, in voxels: with at least
 /// 0.50 a sheet is ray-tight in every orientation under trilinear sampling.
 inline constexpr double kHalfThicknessVoxels = 0.55;

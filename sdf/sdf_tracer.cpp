@@ -1,0 +1,308 @@
+#include "sdf/sdf_tracer.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "core/trace/surface.h"
+#include "sdf/transform_scale.h"
+#include "sdf/triangle_bvh.h"
+
+namespace sdf {
+
+namespace {
+
+/// What the cubic solver is held to, in voxels.
+constexpr double kTraceErrorVoxels = 1e-3;
+
+/// A crossing farther than this from every stored triangle is the lid with which the winding number closes a
+/// hole of the mesh, and no surface. Where the sign changes at the mesh, the surface passes through the cell,
+/// whose diagonal is 1.74.
+constexpr double kFarthestTriangleVoxels = 2.0;
+
+/// Beyond this distance from its triangle a hit lies on the thickened shell and not on the surface itself:
+/// the shell of a flat sheet is found at 0.32 to 0.78 voxels, surfaces of solids nearer than 0.2.
+constexpr double kShellVoxels = 0.25;
+
+/// Room between a ray that leaves a shell and the shell.
+constexpr double kShellClearanceVoxels = 0.05;
+
+Triangle local_triangle(const core::Mesh& mesh, std::uint32_t index) {
+    const glm::uvec3& corners = mesh.triangles[index];
+    return {glm::dvec3(mesh.positions[corners.x]), glm::dvec3(mesh.positions[corners.y]),
+            glm::dvec3(mesh.positions[corners.z])};
+}
+
+/// Four units in the last place of a float of this magnitude.
+double four_ulp(double magnitude) {
+    return 4.0 * magnitude * static_cast<double>(std::numeric_limits<float>::epsilon());
+}
+
+}  // namespace
+
+/// A ray in an instance's voxels, and what it has met there so far.
+struct SdfTracer::LocalRay {
+    const core::Ray& world;
+    std::uint32_t instance;
+    const PlacedGrid& placed;
+    const core::Mesh& mesh;
+    glm::dvec3 origin;     ///< Voxel coordinates.
+    glm::dvec3 direction;  ///< Voxels a world unit.
+    bool has_entered_shell = false;
+};
+
+/// The nearest visible crossing so far.
+struct SdfTracer::Nearest {
+    double t = 0.0;  ///< Until there is one: t_max.
+    std::uint32_t instance = core::kNoIndex;
+    std::uint32_t triangle = core::kNoIndex;
+    glm::dvec2 barycentrics{0.0};
+    bool is_front = true;
+    bool is_shell = false;
+    Crossing crossing;
+
+    bool found() const { return instance != core::kNoIndex; }
+};
+
+struct SdfTracer::Work {
+    std::uint64_t rays = 0;
+    std::uint64_t steps = 0;
+    std::uint64_t exhausted = 0;
+    std::uint32_t ray_steps = 0;
+    bool ray_exhausted = false;
+};
+
+SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids)
+    : scene_(scene), grids_(std::move(grids)), has_alpha_(core::has_alpha(scene)) {
+    assert(grids_.size() == scene.meshes.size());
+    std::vector<core::DoubleBounds> boxes(scene.instances.size());
+    placed_.resize(scene.instances.size());
+    for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+        const core::Instance& instance = scene.instances[i];
+        const BrickGrid* grid = grids_[instance.mesh].get();
+        if (!grid || grid->occupied_voxels().empty()) continue;
+        const double h = grid->voxel_size();
+        PlacedGrid& placed = placed_[i];
+        placed.grid = grid;
+        placed.voxel_from_world_direction = glm::dmat3(instance.local_from_world) / h;
+        placed.voxel_origin = (glm::dvec3(instance.local_from_world[3]) - grid->origin()) / h;
+        placed.world_from_voxel_scale = largest_singular_value(glm::dmat3(instance.world_from_local)) * h;
+        const double representation = std::min(grid->info().error_voxels.max, 1.0);
+        placed.start_offset =
+            static_cast<float>(placed.world_from_voxel_scale *
+                               (grid->half_thickness_voxels() + representation + kShellClearanceVoxels));
+        boxes[i] = core::transformed(grid->local_bounds(), instance.world_from_local);
+        // The corners are rounded; rays are clipped exactly later, in the grid's own space.
+        const glm::dvec3 slack =
+            1e-12 * (glm::abs(boxes[i].minimum) + glm::abs(boxes[i].maximum)) + 1e-6 * boxes[i].extent();
+        boxes[i].minimum -= slack;
+        boxes[i].maximum += slack;
+    }
+    tree_ = InstanceTree(boxes);
+}
+
+bool SdfTracer::resolve(const LocalRay& ray, const Crossing& crossing, Nearest& found) const {
+    const BrickGrid& grid = *ray.placed.grid;
+    const Brick& brick = grid.brick_at(crossing.brick);
+    const glm::ivec3 local = crossing.cell - crossing.cell / kBrickCells * kBrickCells;
+    const glm::dvec3 voxel_point = glm::dvec3(crossing.cell) + crossing.point;
+    const glm::dvec3 point = grid.origin() + grid.voxel_size() * voxel_point;
+
+    std::array<std::int32_t, 8> candidates;
+    for (int i = 0; i < 8; ++i) {
+        candidates[static_cast<std::size_t>(i)] = brick.triangle[static_cast<std::size_t>(
+            Brick::index(local.x + (i >> 2), local.y + (i >> 1 & 1), local.z + (i & 1)))];
+    }
+    double nearest_squared = std::numeric_limits<double>::infinity();
+    std::int32_t triangle = -1;
+    TrianglePoint nearest_point;
+    for (std::size_t i = 0; i < 8; ++i) {
+        const std::int32_t candidate = candidates[i];
+        if (candidate < 0 || std::find(candidates.begin(), candidates.begin() + i, candidate) !=
+                                 candidates.begin() + i) {
+            continue;
+        }
+        const TrianglePoint closest =
+            closest_point(local_triangle(ray.mesh, static_cast<std::uint32_t>(candidate)), point);
+        const glm::dvec3 offset = point - closest.position;
+        const double squared = glm::dot(offset, offset);
+        if (squared < nearest_squared || (squared == nearest_squared && candidate < triangle)) {
+            nearest_squared = squared;
+            nearest_point = closest;
+            triangle = candidate;
+        }
+    }
+    if (triangle < 0) return false;
+    const auto index = static_cast<std::uint32_t>(triangle);
+    const bool is_inflated = grid.is_inflated(index);
+    const double distance_voxels = std::sqrt(nearest_squared) / grid.voxel_size();
+    if (distance_voxels > kFarthestTriangleVoxels + (is_inflated ? kHalfThicknessVoxels : 0.0)) return false;
+
+    const Triangle corners = local_triangle(ray.mesh, index);
+    // Directions in voxels and in local units differ by h alone, which no sign below depends on.
+    found.is_shell = is_inflated && distance_voxels > kShellVoxels;
+    if (found.is_shell) {
+        if (glm::dot(point - nearest_point.position, ray.direction) > 0.0) {
+            // The ray leaves a shell. It has met the sheet itself only if it started inside the shell, on
+            // the other side.
+            if (ray.has_entered_shell) return false;
+            const glm::dvec3 origin = grid.origin() + grid.voxel_size() * ray.origin;
+            const double t = intersect(corners, origin, grid.voxel_size() * ray.direction);
+            if (!(t >= ray.world.t_min && t <= crossing.t)) return false;
+        }
+    }
+    found.barycentrics = nearest_point.barycentrics;
+    if (has_alpha_ && !core::is_visible(scene_, ray.instance, index, glm::vec2(found.barycentrics),
+                                        ray.world.seed)) {
+        return false;
+    }
+    found.t = crossing.t;
+    found.instance = ray.instance;
+    found.triangle = index;
+    found.is_front = glm::dot(ray.direction, corners.scaled_normal()) < 0.0;
+    found.crossing = crossing;
+    return true;
+}
+
+void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest,
+                               Work& work) const {
+    const PlacedGrid& placed = placed_[instance];
+    LocalRay local{ray,
+                   instance,
+                   placed,
+                   scene_.meshes[scene_.instances[instance].mesh],
+                   placed.voxel_from_world_direction * glm::dvec3(ray.origin) + placed.voxel_origin,
+                   placed.voxel_from_world_direction * glm::dvec3(ray.direction)};
+    double t_min = ray.t_min, t_max = nearest.t;
+    if (!clip_to_box(placed.grid->occupied_voxels(), local.origin, finite_inverse(local.direction), t_min,
+                     t_max)) {
+        return;
+    }
+    RayMarch march(*placed.grid, local.origin, local.direction, t_min, t_max);
+    Crossing crossing;
+    while (march.next(crossing)) {
+        Nearest found;
+        if (resolve(local, crossing, found)) {
+            // At equal distance the lowest instance wins, whatever the order of the walk.
+            if (found.t < nearest.t || !nearest.found() || instance < nearest.instance) nearest = found;
+            break;
+        }
+        local.has_entered_shell = local.has_entered_shell || found.is_shell;
+    }
+    work.ray_steps += march.steps();
+    work.ray_exhausted = work.ray_exhausted || march.is_exhausted();
+}
+
+core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const {
+    const PlacedGrid& placed = placed_[nearest.instance];
+    const BrickGrid& grid = *placed.grid;
+    glm::dvec3 gradient = smooth_gradient(grid, nearest.crossing.cell, nearest.crossing.point);
+    if (!(glm::length(gradient) >= 1e-6)) {
+        const core::Mesh& mesh = scene_.meshes[scene_.instances[nearest.instance].mesh];
+        gradient = glm::normalize(local_triangle(mesh, nearest.triangle).scaled_normal());
+        if ((glm::dot(gradient, placed.voxel_from_world_direction * glm::dvec3(ray.direction)) < 0.0) !=
+            nearest.crossing.enters_negative) {
+            gradient = -gradient;
+        }
+    }
+    const glm::dvec3 direction(ray.direction);
+    // Inverse transpose: gradients map by the transpose of voxel_from_world.
+    glm::dvec3 normal = glm::normalize(glm::transpose(placed.voxel_from_world_direction) * gradient);
+    if (!nearest.crossing.enters_negative) normal = -normal;
+    const double cosine = glm::dot(normal, direction);
+    // The smooth normal may turn away from a ray that only just meets the surface. Its side stays what the
+    // crossing says; it is tilted until it faces the ray.
+    constexpr double kFacing = 1e-6;
+    if (cosine > -kFacing) normal = glm::normalize(normal - (cosine + 2.0 * kFacing) * direction);
+
+    core::Hit hit;
+    hit.status = core::HitStatus::kHit;
+    hit.t = std::clamp(static_cast<float>(nearest.t), ray.t_min, ray.t_max);
+    hit.normal = glm::vec3(normal);
+    hit.instance = nearest.instance;
+    hit.triangle = nearest.triangle;
+    hit.barycentrics = glm::vec2(nearest.barycentrics);
+    hit.front = nearest.is_front;
+    const glm::dvec3 origin(ray.origin);
+    const glm::dvec3 position = origin + nearest.t * direction;
+    const double magnitude = std::max({glm::length(position), glm::length(origin), nearest.t});
+    double clearance_voxels = 2.0 * kTraceErrorVoxels;
+    if (nearest.is_shell) clearance_voxels = grid.half_thickness_voxels() + kShellClearanceVoxels;
+    hit.offset = static_cast<float>(
+        std::max(clearance_voxels * placed.world_from_voxel_scale, four_ulp(magnitude)));
+    return hit;
+}
+
+core::Hit SdfTracer::trace_one(const core::Ray& ray, bool any, Work& work) const {
+    ++work.rays;
+    core::Hit hit;
+    if (!core::is_valid_ray(ray)) return hit;
+    work.ray_steps = 0;
+    work.ray_exhausted = false;
+    Nearest nearest;
+    nearest.t = ray.t_max;
+    tree_.walk(
+        glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min, [&] { return nearest.t; },
+        [&](std::uint32_t instance) {
+            trace_instance(ray, instance, nearest, work);
+            return any && nearest.found();
+        });
+    work.steps += work.ray_steps;
+    work.exhausted += work.ray_exhausted;
+    if (nearest.found()) {
+        if (any) {
+            hit.status = core::HitStatus::kHit;
+        } else {
+            hit = finish(ray, nearest);
+        }
+    } else if (work.ray_exhausted) {
+        hit.status = core::HitStatus::kExhausted;
+    }
+    hit.steps = work.ray_steps;
+    return hit;
+}
+
+void SdfTracer::trace_closest(const core::RayStream& rays, core::HitStream& hits) const {
+    hits.resize(rays.size());
+    Work work;
+    for (std::size_t i = 0; i < rays.size(); ++i) hits.set(i, trace_one(rays.get(i), false, work));
+    count(work);
+}
+
+void SdfTracer::trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const {
+    assert(occluded.size() == rays.size());
+    Work work;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        occluded[i] = trace_one(rays.get(i), true, work).hit() ? 1 : 0;
+    }
+    count(work);
+}
+
+float SdfTracer::start_offset(std::uint32_t instance) const {
+    return placed_[instance].start_offset;
+}
+
+void SdfTracer::count(const Work& work) const {
+    ray_count_.fetch_add(work.rays, std::memory_order_relaxed);
+    step_count_.fetch_add(work.steps, std::memory_order_relaxed);
+    exhausted_count_.fetch_add(work.exhausted, std::memory_order_relaxed);
+}
+
+SdfTracer::Statistics SdfTracer::statistics() const {
+    return {ray_count_.load(std::memory_order_relaxed), step_count_.load(std::memory_order_relaxed),
+            exhausted_count_.load(std::memory_order_relaxed)};
+}
+
+std::size_t SdfTracer::bytes() const {
+    std::size_t total = placed_.capacity() * sizeof(PlacedGrid) + tree_.bytes();
+    std::set<const BrickGrid*> counted;
+    for (const auto& grid : grids_) {
+        if (grid && counted.insert(grid.get()).second) total += grid->bytes();
+    }
+    return total;
+}
+
+}  // namespace sdf

@@ -15,6 +15,7 @@
 #include "core/trace/tracer.h"
 #include "sdf/brick_grid.h"
 #include "sdf/instance_tree.h"
+#include "sdf/sphere_trace.h"
 
 namespace sdf {
 
@@ -46,22 +47,26 @@ public:
     std::size_t bytes() const;
 
 private:
+    /// One instance, ready for rays.
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
-        glm::dmat3 voxel_from_world_linear{1.0};  ///< Directions: world -> voxels.
-        glm::dmat4 voxel_from_world{1.0};         ///< Points: world -> voxels.
-        double largest_scale = 1.0;               ///< Largest singular value of world_from_local.
+        glm::dmat3 voxel_from_world_direction{1.0};
+        glm::dvec3 voxel_origin{0.0};  ///< Voxel coordinates of the world's origin.
+        double world_from_voxel_scale = 1.0;  ///< Largest stretch of one voxel, in world units.
         float start_offset = 0.0f;
     };
-    struct Candidate;
+    struct LocalRay;
+    struct Nearest;
+    struct Work;
 
-    template <bool kAnyHit>
-    core::Hit trace_one(const core::Ray& ray) const;
-    /// Looks for the first visible crossing of one instance nearer than the hit so far. Returns whether the
-    /// step cap was met.
-    bool trace_instance(const core::Ray& ray, std::uint32_t instance, core::Hit& nearest) const;
-    bool resolve(const core::Ray& ray, const Candidate& candidate, core::Hit& hit) const;
-    void count(std::uint64_t rays, std::uint64_t steps, std::uint64_t exhausted) const;
+    /// The one path of both queries. Stops at any hit if `any`.
+    core::Hit trace_one(const core::Ray& ray, bool any, Work& work) const;
+    /// Looks for the first visible crossing of one instance before the nearest hit so far.
+    void trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest, Work& work) const;
+    /// Finds the triangle of a crossing; false where there is no visible surface.
+    bool resolve(const LocalRay& ray, const Crossing& crossing, Nearest& found) const;
+    core::Hit finish(const core::Ray& ray, const Nearest& nearest) const;
+    void count(const Work& work) const;
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sdf/instance_tree.h"
+
 namespace sdf {
 
 namespace {
@@ -79,7 +81,7 @@ struct Cubic {
 
 RayMarch::RayMarch(const BrickGrid& grid, const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
                    double t_max)
-    : grid_(grid), origin_(origin), direction_(direction), inverse_(1.0 / direction), t_end_(t_max) {
+    : grid_(grid), origin_(origin), direction_(direction), inverse_(finite_inverse(direction)), t_end_(t_max) {
     cell_limit_ = glm::ivec3(grid.occupied_voxels().empty() ? glm::dvec3(0.0)
                                                             : grid.occupied_voxels().maximum);
     is_done_ = !(t_min <= t_max) || cell_limit_.x == 0;

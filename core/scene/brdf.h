@@ -2,9 +2,11 @@
 //
 // Khronos Group, "glTF 2.0 Specification", appendix B, with KHR_materials_ior and _specular: Lambert under a
 // GGX microfacet coat (Smith height-correlated masking, Schlick Fresnel on V.H), mixed with a metal.
-// Visible normals are sampled after Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 2018.
-// Directions are in the shading frame: +Z is the shading normal, all of them unit and pointing away from the
-// surface.
+// The appendix weighs the diffuse layer by 1 - F(V.H), which gains energy towards grazing: at base colour 0.8
+// and roughness 0.3 the directional albedo is 1.03 at 80 degrees and 1.17 at 89 (its mean stays below 1). It
+// is kept, so that pictures agree with other glTF renderers. Visible normals are sampled after Heitz,
+// "Sampling the GGX Distribution of Visible Normals", JCGT 2018. Directions are in the shading frame: +Z is
+// the shading normal, all of them unit and pointing away from the surface.
 #pragma once
 
 #include <glm/glm.hpp>

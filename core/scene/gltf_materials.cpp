@@ -119,14 +119,14 @@ private:
     float unit(const JsonElement& element, const char* key, double value) {
         if (value >= 0.0 && value <= 1.0) return static_cast<float>(value);
         document_.warn_once(
-            fmt::format("{}: {} is {}; it must be in [0, 1] and is clamped", element.where(), key, value));
+            fmt::format("{}: {} is {}; it must be in [0, 1] and is clamped", element.path(), key, value));
         return value > 0.0 ? 1.0f : 0.0f;
     }
 
     double non_negative(const JsonElement& element, const char* key, double value) {
         if (value >= 0.0) return value;
-        document_.warn_once(fmt::format("{}: {} is {}; it must not be negative and counts as 0",
-                                        element.where(), key, value));
+        document_.warn_once(
+            fmt::format("{}: {} is {}; it must not be negative and counts as 0", element.path(), key, value));
         return 0.0;
     }
 
@@ -146,7 +146,7 @@ private:
             document_.warn_once(
                 fmt::format("{}: texCoord is {}; only TEXCOORD_0 and TEXCOORD_1 are read, so the "
                             "texture is left out",
-                            info.where(), uv_set));
+                            info.path(), uv_set));
             return use;
         }
         use.uv_set = static_cast<int>(uv_set);
@@ -232,7 +232,8 @@ private:
                 try {
                     const JsonElement element = document_.element("images", gltf_images_[i]);
                     const std::vector<std::uint8_t> encoded = document_.read_image(gltf_images_[i]);
-                    result_.images[i] = decode_texture_image(encoded, element.where());
+                    result_.images[i] = decode_texture_image(
+                        encoded, fmt::format("{} {}", document_.file_name(), element.path()));
                     result_.images[i].name = element.text_or("name", "");
                 } catch (...) {
                     errors[i] = std::current_exception();

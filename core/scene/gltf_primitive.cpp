@@ -24,7 +24,7 @@ GltfAccessor open_attribute(const GltfDocument& document, const JsonElement& pri
     GltfAccessor accessor(document, index);
     if (accessor.component_count() < least_components || accessor.component_count() > most_components) {
         accessor.element().fail(fmt::format("has {} components; {} of {} needs {}",
-                                            accessor.component_count(), name, primitive.where(),
+                                            accessor.component_count(), name, primitive.path(),
                                             most_components));
     }
     if (accessor.count() != vertex_count) {

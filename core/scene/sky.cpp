@@ -17,7 +17,9 @@ struct Sky::Map {
     int width = 0;
     int height = 0;
     std::vector<glm::vec3> texels;
-    Distribution2D distribution;
+    Distribution2D distribution;  ///< Over texels, by tent-filtered luminance x solid angle.
+    std::vector<float>
+        row_cosine;  ///< Cosine of the polar angle at the upper edge of each row, and at the end.
     float cos_rotation = 1.0f;
     float sin_rotation = 0.0f;
 
@@ -35,14 +37,28 @@ struct Sky::Map {
         return {u, v};
     }
 
-    glm::vec3 direction_from_point(const glm::vec2& point) const {
+    std::size_t row_of(const glm::vec2& point) const {
+        return static_cast<std::size_t>(
+            std::clamp(static_cast<int>(point.y * static_cast<float>(height)), 0, height - 1));
+    }
+
+    /// Solid angle of a texel of this row times the number of texels.
+    float scaled_solid_angle(std::size_t row) const {
+        return 2.0f * kPi * (row_cosine[row] - row_cosine[row + 1]) * static_cast<float>(height);
+    }
+
+    /// A point of the distribution to a direction: uniform in solid angle within each texel, so that the
+    /// density is constant there, at the poles too.
+    glm::vec3 direction_from_sample(const glm::vec2& point) const {
+        const std::size_t row = row_of(point);
+        const float within = point.y * static_cast<float>(height) - static_cast<float>(row);
+        const float cosine = glm::mix(row_cosine[row], row_cosine[row + 1], within);
+        const float sine = std::sqrt(std::max(0.0f, (1.0f - cosine) * (1.0f + cosine)));
         const float angle = (point.x - 0.5f) * 2.0f * kPi;
-        const float polar = point.y * kPi;
-        const float s = std::sin(polar);
-        const float x = s * std::sin(angle);
-        const float z = -s * std::cos(angle);
-        return glm::normalize(glm::vec3(cos_rotation * x + sin_rotation * z, std::cos(polar),
-                                        -sin_rotation * x + cos_rotation * z));
+        const float x = sine * std::sin(angle);
+        const float z = -sine * std::cos(angle);
+        return glm::normalize(
+            glm::vec3(cos_rotation * x + sin_rotation * z, cosine, -sin_rotation * x + cos_rotation * z));
     }
 
     /// Bilinear, around the seam in u, clamped at the poles.
@@ -101,9 +117,14 @@ Sky Sky::latitude_longitude(const Image& image, float rotation, const std::strin
     // Bilinear reading spreads a texel over its neighbours, so the weight of a texel is the tent-filtered
     // luminance around it: positive wherever the interpolated radiance is.
     std::vector<float> weights(map->texels.size());
-    double mean = 0.0, sine_sum = 0.0;
+    for (int y = 0; y <= map->height; ++y) {
+        map->row_cosine.push_back(
+            static_cast<float>(std::cos(static_cast<double>(kPi) * y / static_cast<double>(map->height))));
+    }
+    double mean = 0.0;
     for (int y = 0; y < map->height; ++y) {
-        const float sine = std::sin(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(map->height));
+        const auto row_index = static_cast<std::size_t>(y);
+        const float height_share = 0.5f * (map->row_cosine[row_index] - map->row_cosine[row_index + 1]);
         for (int x = 0; x < map->width; ++x) {
             float sum = 0.0f;
             for (int dy = -1; dy <= 1; ++dy) {
@@ -115,16 +136,16 @@ Sky Sky::latitude_longitude(const Image& image, float rotation, const std::strin
                 }
             }
             weights[static_cast<std::size_t>(y) * static_cast<std::size_t>(map->width) +
-                    static_cast<std::size_t>(x)] = sum / 16.0f * sine;
-            mean += static_cast<double>(luminance(map->texel(x, y))) * static_cast<double>(sine);
-            sine_sum += static_cast<double>(sine);
+                    static_cast<std::size_t>(x)] = sum / 16.0f * height_share;
+            mean += static_cast<double>(luminance(map->texel(x, y))) * static_cast<double>(height_share) /
+                    map->width;
         }
     }
     map->distribution = Distribution2D(weights, map->width, map->height);
 
     Sky sky;
     sky.black_ = !(mean > 0.0);
-    sky.mean_luminance_ = static_cast<float>(mean / sine_sum);
+    sky.mean_luminance_ = static_cast<float>(mean);
     sky.map_ = std::move(map);
     return sky;
 }
@@ -152,11 +173,10 @@ Sky::Sample Sky::sample(const glm::vec2& u) const {
         return result;
     }
     const Distribution2D::Sample point = map_->distribution.sample(u);
-    const float sine = std::sin(point.point.y * kPi);
-    if (!(point.pdf > 0.0f) || !(sine > 0.0f)) return result;
-    result.direction = map_->direction_from_point(point.point);
-    result.radiance = map_->interpolate(point.point);
-    result.pdf = point.pdf / (2.0f * kPi * kPi * sine);
+    if (!(point.pdf > 0.0f)) return result;
+    result.direction = map_->direction_from_sample(point.point);
+    result.radiance = map_->interpolate(map_->point_from_direction(result.direction));
+    result.pdf = point.pdf / map_->scaled_solid_angle(map_->row_of(point.point));
     return result;
 }
 
@@ -164,8 +184,7 @@ float Sky::pdf(const glm::vec3& direction) const {
     if (black_) return 0.0f;
     if (!map_) return kUniformSpherePdf;
     const glm::vec2 point = map_->point_from_direction(direction);
-    const float sine = std::sin(point.y * kPi);
-    return sine > 0.0f ? map_->distribution.pdf(point) / (2.0f * kPi * kPi * sine) : 0.0f;
+    return map_->distribution.pdf(point) / map_->scaled_solid_angle(map_->row_of(point));
 }
 
 }  // namespace core

@@ -144,7 +144,7 @@ TEST_P(TracerContract, RaysThatLeaveAHitDoNotMeetItsSurfaceAgain) {
             bounces.push_back(
                 make_ray(point.origin_above(), random.cosine_direction(glm::dvec3(point.geometric_normal))));
         }
-        ASSERT_GT(bounces.size(), 3000u);
+        ASSERT_GT(bounces.size(), 1500u);
         const core::HitStream again = trace(*tracer, stream_of(bounces));
         int self_hit_count = 0;
         for (std::size_t i = 0; i < bounces.size(); ++i) self_hit_count += again.get(i).hit() ? 1 : 0;

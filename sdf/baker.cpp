@@ -1,0 +1,249 @@
+#include "sdf/baker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+
+#include "core/support/hash.h"
+#include "core/support/parallel.h"
+#include "sdf/transform_scale.h"
+#include "sdf/vdb_file.h"
+
+namespace sdf {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Times a field may be made coarser to fit a budget of bytes.
+constexpr int kMostCoarsenings = 6;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::string source_hash(const core::Mesh& mesh) {
+    core::Hasher hasher;
+    hasher.add_range(std::span<const glm::vec3>(mesh.positions));
+    hasher.add_range(std::span<const glm::uvec3>(mesh.triangles));
+    return hasher.hex();
+}
+
+std::string settings_hash(double wanted_voxel, const BakeSettings& settings) {
+    core::Hasher hasher;
+    hasher.add(wanted_voxel);
+    hasher.add(settings.max_dimension);
+    hasher.add(settings.max_field_bytes);
+    hasher.add(settings.surface_class);
+    return hasher.hex();
+}
+
+/// Letters, digits, '-', '_' and '.' of a name, others as '_'; short, and told apart by the mesh's number.
+std::string file_name(const core::Mesh& mesh, std::uint32_t index) {
+    constexpr std::size_t kLongestName = 80;
+    std::string safe;
+    for (const char c : mesh.name.substr(0, kLongestName)) {
+        const bool is_safe = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                             c == '-' || c == '_' || (c == '.' && !safe.empty());
+        safe += is_safe ? c : '_';
+    }
+    return fmt::format("{}_{}.vdb", safe.empty() ? "mesh" : safe, index);
+}
+
+/// The largest scale of a mesh over its instances; 1 where it has none.
+double largest_scale(const core::Scene& scene, std::uint32_t mesh) {
+    double scale = 0.0;
+    for (const core::Instance& instance : scene.instances) {
+        if (instance.mesh == mesh) {
+            scale = std::max(scale, largest_singular_value(glm::dmat3(instance.world_from_local)));
+        }
+    }
+    return scale > 0.0 ? scale : 1.0;
+}
+
+/// h as asked for, in local units; before any clamp.
+double wanted_voxel(const core::Scene& scene, std::uint32_t mesh, double longest_side,
+                    const BakeSettings& settings) {
+    if (settings.voxel_world) return *settings.voxel_world / largest_scale(scene, mesh);
+    return longest_side / settings.resolution;
+}
+
+MeshView view_of(const core::Mesh& mesh) {
+    return {mesh.positions, mesh.triangles};
+}
+
+/// Bakes and lays out, coarser where limits ask for it.
+SampledField bake_within_limits(const core::Mesh& mesh, double voxel, double longest_side,
+                                const BakeSettings& settings, std::shared_ptr<const BrickGrid>& grid) {
+    std::vector<std::string> warnings;
+    const double finest = longest_side / settings.max_dimension;
+    if (voxel < finest) {
+        warnings.push_back(fmt::format("a voxel of {:g} would give {:.0f} voxels along a side; {} is used", voxel,
+                                       longest_side / voxel, finest));
+        voxel = finest;
+    }
+    for (int attempt = 0;; ++attempt) {
+        SampledField field = bake_mesh(view_of(mesh), {voxel, settings.surface_class});
+        grid = std::make_shared<const BrickGrid>(field);
+        const double excess = settings.max_field_bytes == 0
+                                  ? 0.0
+                                  : static_cast<double>(grid->bytes()) /
+                                        static_cast<double>(settings.max_field_bytes);
+        if (excess <= 1.0 || attempt == kMostCoarsenings) {
+            if (excess > 1.0) {
+                throw core::InputError(
+                    core::ErrorKind::kOutOfMemory,
+                    fmt::format("its field takes {} bytes even with a voxel of {:g}; --max-field-bytes allows {}",
+                                grid->bytes(), voxel, settings.max_field_bytes));
+            }
+            field.info.warnings.insert(field.info.warnings.begin(), warnings.begin(), warnings.end());
+            return field;
+        }
+        // Bricks follow the surface, so bytes go with 1 / h^2; a little more so that one step is enough.
+        const double coarser = voxel * std::max(1.1, 1.05 * std::sqrt(excess));
+        warnings.push_back(fmt::format("a voxel of {:g} takes {} bytes; {:g} is used", voxel, grid->bytes(), coarser));
+        voxel = coarser;
+    }
+}
+
+/// Takes an earlier bake if it fits; says why in `warnings` if the file cannot be read at all.
+std::shared_ptr<const BrickGrid> reuse(const fs::path& file, const BakeKey& key,
+                                       std::vector<std::string>& warnings) {
+    try {
+        if (!fs::exists(file) || read_bake_key(file) != key) return nullptr;
+        return std::make_shared<const BrickGrid>(read_field(file));
+    } catch (const core::InputError& error) {
+        warnings.push_back(fmt::format("an earlier bake is of no use and was replaced: {}", error.what()));
+        return nullptr;
+    }
+}
+
+void bake_one(const core::Scene& scene, const BakeSettings& settings, const fs::path& folder, MeshBake& bake) {
+    const core::Mesh& mesh = scene.meshes[bake.mesh];
+    const glm::dvec3 extent = usable_extent(view_of(mesh));
+    const double longest = std::max({extent.x, extent.y, extent.z});
+    if (!(longest > 0.0)) {
+        throw core::InputError(core::ErrorKind::kBadData,
+                               fmt::format("none of its {} faces can be baked; at least one needs an area and "
+                                           "finite coordinates",
+                                           mesh.triangles.size()));
+    }
+    const double voxel = wanted_voxel(scene, bake.mesh, longest, settings);
+    const BakeKey key{source_hash(mesh), settings_hash(voxel, settings)};
+    std::vector<std::string> warnings;
+    if (!folder.empty()) {
+        bake.file = folder / file_name(mesh, bake.mesh);
+        if (!settings.force) bake.grid = reuse(bake.file, key, warnings);
+        bake.reused = bake.grid != nullptr;
+    }
+    if (!bake.reused) {
+        std::shared_ptr<const BrickGrid> grid;
+        SampledField field = bake_within_limits(mesh, voxel, longest, settings, grid);
+        field.info.source_hash = key.source_hash;
+        field.info.settings_hash = key.settings_hash;
+        if (!folder.empty()) write_field(bake.file, field, mesh.name);
+        field.info.warnings.insert(field.info.warnings.begin(), warnings.begin(), warnings.end());
+        bake.grid = std::make_shared<const BrickGrid>(field);
+    }
+    if (!bake.file.empty()) bake.file_bytes = fs::file_size(bake.file);
+}
+
+void check_settings(const core::Scene& scene, const BakeSettings& settings) {
+    const auto refuse = [](const std::string& message) {
+        throw core::InputError(core::ErrorKind::kUsage, message);
+    };
+    if (settings.voxel_world && !(*settings.voxel_world > 0.0 && std::isfinite(*settings.voxel_world))) {
+        refuse(fmt::format("a voxel of {} is not possible; it must be finite and above 0", *settings.voxel_world));
+    }
+    if (!settings.voxel_world && (settings.resolution < 1 || settings.resolution > kMostVoxelsAlongSide)) {
+        refuse(fmt::format("a resolution of {} is not possible; 1 to {} is", settings.resolution,
+                           kMostVoxelsAlongSide));
+    }
+    if (settings.max_dimension < 1 || settings.max_dimension > kMostVoxelsAlongSide) {
+        refuse(fmt::format("a largest dimension of {} is not possible; 1 to {} is", settings.max_dimension,
+                           kMostVoxelsAlongSide));
+    }
+    if (settings.only_mesh.empty()) return;
+    std::vector<std::string> names;
+    for (const core::Mesh& mesh : scene.meshes) {
+        if (mesh.name == settings.only_mesh) return;
+        names.push_back(fmt::format("'{}'", mesh.name));
+    }
+    constexpr std::size_t kMostNames = 12;
+    const bool is_long = names.size() > kMostNames;
+    names.resize(std::min(names.size(), kMostNames));
+    refuse(fmt::format("'{}' has no mesh '{}'; it has {}{}", scene.name, settings.only_mesh,
+                       fmt::join(names, ", "), is_long ? ", ..." : ""));
+}
+
+void make_folder(const fs::path& folder) {
+    if (folder.empty()) return;
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error || !fs::is_directory(folder)) {
+        throw core::InputError(core::ErrorKind::kCannotCreate,
+                               fmt::format("'{}': the folder cannot be made ({})", folder.string(),
+                                           error ? error.message() : "something else has that name"));
+    }
+}
+
+/// Trouble with this mesh alone, as opposed to a folder that no mesh can be written to.
+bool is_about_mesh(const core::InputError& error) {
+    return error.kind() == core::ErrorKind::kBadData || error.kind() == core::ErrorKind::kOutOfMemory;
+}
+
+}  // namespace
+
+BakeResult bake_scene(const core::Scene& scene, const BakeSettings& settings, const fs::path& folder,
+                      const core::Progress& progress, const core::StopRequested& stop) {
+    const auto start = std::chrono::steady_clock::now();
+    check_settings(scene, settings);
+    make_folder(folder);
+    BakeResult result;
+    double total_triangles = 0.0;
+    for (std::uint32_t i = 0; i < scene.meshes.size(); ++i) {
+        const core::Mesh& mesh = scene.meshes[i];
+        if (!settings.only_mesh.empty() && mesh.name != settings.only_mesh) continue;
+        MeshBake bake;
+        bake.mesh = i;
+        bake.name = mesh.name;
+        bake.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
+        total_triangles += bake.triangle_count;
+        result.meshes.push_back(std::move(bake));
+    }
+    std::mutex progress_mutex;
+    double done_triangles = 0.0;
+    core::parallel_for(result.meshes.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            MeshBake& bake = result.meshes[i];
+            if (stop && stop()) return;
+            const auto mesh_start = std::chrono::steady_clock::now();
+            try {
+                bake_one(scene, settings, folder, bake);
+            } catch (const core::InputError& error) {
+                if (!is_about_mesh(error)) throw;
+                bake.grid = nullptr;
+                bake.file.clear();
+                bake.error = core::InputError(
+                    error.kind(), fmt::format("'{}': mesh '{}': {}", scene.name, bake.name, error.what()));
+            }
+            bake.seconds = seconds_since(mesh_start);
+            const std::lock_guard lock(progress_mutex);
+            done_triangles += bake.triangle_count;
+            if (progress) progress("bake", total_triangles > 0.0 ? done_triangles / total_triangles : 1.0);
+        }
+    });
+    result.seconds = seconds_since(start);
+    return result;
+}
+
+std::vector<std::shared_ptr<const BrickGrid>> grids_by_mesh(const core::Scene& scene, const BakeResult& result) {
+    std::vector<std::shared_ptr<const BrickGrid>> grids(scene.meshes.size());
+    for (const MeshBake& bake : result.meshes) grids[bake.mesh] = bake.grid;
+    return grids;
+}
+
+}  // namespace sdf
