@@ -52,7 +52,7 @@ const Row kRows[] = {
     {"max", "--fail-max", "relative error, max", "", [](const core::ImageMetrics& m) { return m.max; }},
     {"energy_bias", "--fail-energy-bias", "energy bias, %", "100 (sum Y_I / sum Y_R - 1)",
      [](const core::ImageMetrics& m) { return m.energy_bias_percent; }},
-    {"leak", "--fail-leak", "leak", "sum Y_I where R is dark / sum Y_R",
+    {"leak", "--fail-leak", "leak", "sum max(Y_I - Y_R, 0) where R is dark / sum Y_R",
      [](const core::ImageMetrics& m) { return m.leak.energy_fraction; }},
 };
 constexpr std::size_t kFirstPercentile = 6, kLastPercentile = 9;

@@ -15,8 +15,8 @@ constexpr std::size_t kSampleCount = 100'000;
 /// An error so large that the point may be buried in another solid.
 constexpr double kSuspectVoxels = 0.5;
 
-double error_at(const glm::dvec3& point, const Triangle& triangle, bool inflated, const WindingNumber& winding,
-                const LeafMap& field) {
+double error_at(const glm::dvec3& point, const Triangle& triangle, bool inflated,
+                const WindingNumber& winding, const LeafMap& field) {
     double value = 0.0;
     if (!field.interpolate(point, value)) return kBandVoxels;
     double error = std::abs(value);

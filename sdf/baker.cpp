@@ -75,36 +75,41 @@ MeshView view_of(const core::Mesh& mesh) {
     return {mesh.positions, mesh.triangles};
 }
 
+struct BakedGrid {
+    SampledField field;
+    std::shared_ptr<const BrickGrid> grid;
+};
+
 /// Bakes and lays out, coarser where limits ask for it.
-SampledField bake_within_limits(const core::Mesh& mesh, double voxel, double longest_side,
-                                const BakeSettings& settings, std::shared_ptr<const BrickGrid>& grid) {
-    std::vector<std::string> warnings;
+BakedGrid bake_within_limits(const core::Mesh& mesh, double voxel, double longest_side,
+                             const BakeSettings& settings, const BakeKey& key,
+                             std::vector<std::string> warnings) {
     const double finest = longest_side / settings.max_dimension;
     if (voxel < finest) {
-        warnings.push_back(fmt::format("a voxel of {:g} would give {:.0f} voxels along a side; {} is used", voxel,
-                                       longest_side / voxel, finest));
+        warnings.push_back(fmt::format("a voxel of {:g} would give {:.0f} voxels along a side; {:g} is used",
+                                       voxel, longest_side / voxel, finest));
         voxel = finest;
     }
     for (int attempt = 0;; ++attempt) {
-        SampledField field = bake_mesh(view_of(mesh), {voxel, settings.surface_class});
-        grid = std::make_shared<const BrickGrid>(field);
-        const double excess = settings.max_field_bytes == 0
-                                  ? 0.0
-                                  : static_cast<double>(grid->bytes()) /
-                                        static_cast<double>(settings.max_field_bytes);
-        if (excess <= 1.0 || attempt == kMostCoarsenings) {
-            if (excess > 1.0) {
-                throw core::InputError(
-                    core::ErrorKind::kOutOfMemory,
-                    fmt::format("its field takes {} bytes even with a voxel of {:g}; --max-field-bytes allows {}",
-                                grid->bytes(), voxel, settings.max_field_bytes));
-            }
-            field.info.warnings.insert(field.info.warnings.begin(), warnings.begin(), warnings.end());
-            return field;
+        BakedGrid baked{bake_mesh(view_of(mesh), {voxel, settings.surface_class}), nullptr};
+        FieldInfo& info = baked.field.info;
+        info.source_hash = key.source_hash;
+        info.settings_hash = key.settings_hash;
+        info.warnings.insert(info.warnings.begin(), warnings.begin(), warnings.end());
+        baked.grid = std::make_shared<const BrickGrid>(baked.field);
+        const std::size_t bytes = baked.grid->bytes();
+        if (settings.max_field_bytes == 0 || bytes <= settings.max_field_bytes) return baked;
+        if (attempt == kMostCoarsenings) {
+            throw core::InputError(
+                core::ErrorKind::kOutOfMemory,
+                fmt::format("its field takes {} bytes even with a voxel of {:g}; --max-field-bytes allows {}",
+                            bytes, voxel, settings.max_field_bytes));
         }
         // Bricks follow the surface, so bytes go with 1 / h^2; a little more so that one step is enough.
+        const double excess = static_cast<double>(bytes) / static_cast<double>(settings.max_field_bytes);
         const double coarser = voxel * std::max(1.1, 1.05 * std::sqrt(excess));
-        warnings.push_back(fmt::format("a voxel of {:g} takes {} bytes; {:g} is used", voxel, grid->bytes(), coarser));
+        warnings.push_back(
+            fmt::format("a voxel of {:g} takes {} bytes; {:g} is used", voxel, bytes, coarser));
         voxel = coarser;
     }
 }
@@ -121,15 +126,17 @@ std::shared_ptr<const BrickGrid> reuse(const fs::path& file, const BakeKey& key,
     }
 }
 
-void bake_one(const core::Scene& scene, const BakeSettings& settings, const fs::path& folder, MeshBake& bake) {
+void bake_one(const core::Scene& scene, const BakeSettings& settings, const fs::path& folder,
+              MeshBake& bake) {
     const core::Mesh& mesh = scene.meshes[bake.mesh];
     const glm::dvec3 extent = usable_extent(view_of(mesh));
     const double longest = std::max({extent.x, extent.y, extent.z});
     if (!(longest > 0.0)) {
-        throw core::InputError(core::ErrorKind::kBadData,
-                               fmt::format("none of its {} faces can be baked; at least one needs an area and "
-                                           "finite coordinates",
-                                           mesh.triangles.size()));
+        throw core::InputError(
+            core::ErrorKind::kBadData,
+            fmt::format("none of its {} faces can be baked; at least one needs an area and "
+                        "finite coordinates",
+                        mesh.triangles.size()));
     }
     const double voxel = wanted_voxel(scene, bake.mesh, longest, settings);
     const BakeKey key{source_hash(mesh), settings_hash(voxel, settings)};
@@ -140,13 +147,9 @@ void bake_one(const core::Scene& scene, const BakeSettings& settings, const fs::
         bake.reused = bake.grid != nullptr;
     }
     if (!bake.reused) {
-        std::shared_ptr<const BrickGrid> grid;
-        SampledField field = bake_within_limits(mesh, voxel, longest, settings, grid);
-        field.info.source_hash = key.source_hash;
-        field.info.settings_hash = key.settings_hash;
-        if (!folder.empty()) write_field(bake.file, field, mesh.name);
-        field.info.warnings.insert(field.info.warnings.begin(), warnings.begin(), warnings.end());
-        bake.grid = std::make_shared<const BrickGrid>(field);
+        const BakedGrid baked = bake_within_limits(mesh, voxel, longest, settings, key, std::move(warnings));
+        if (!folder.empty()) write_field(bake.file, baked.field, mesh.name);
+        bake.grid = baked.grid;
     }
     if (!bake.file.empty()) bake.file_bytes = fs::file_size(bake.file);
 }
@@ -156,7 +159,8 @@ void check_settings(const core::Scene& scene, const BakeSettings& settings) {
         throw core::InputError(core::ErrorKind::kUsage, message);
     };
     if (settings.voxel_world && !(*settings.voxel_world > 0.0 && std::isfinite(*settings.voxel_world))) {
-        refuse(fmt::format("a voxel of {} is not possible; it must be finite and above 0", *settings.voxel_world));
+        refuse(fmt::format("a voxel of {} is not possible; it must be finite and above 0",
+                           *settings.voxel_world));
     }
     if (!settings.voxel_world && (settings.resolution < 1 || settings.resolution > kMostVoxelsAlongSide)) {
         refuse(fmt::format("a resolution of {} is not possible; 1 to {} is", settings.resolution,
@@ -240,7 +244,8 @@ BakeResult bake_scene(const core::Scene& scene, const BakeSettings& settings, co
     return result;
 }
 
-std::vector<std::shared_ptr<const BrickGrid>> grids_by_mesh(const core::Scene& scene, const BakeResult& result) {
+std::vector<std::shared_ptr<const BrickGrid>> grids_by_mesh(const core::Scene& scene,
+                                                            const BakeResult& result) {
     std::vector<std::shared_ptr<const BrickGrid>> grids(scene.meshes.size());
     for (const MeshBake& bake : result.meshes) grids[bake.mesh] = bake.grid;
     return grids;

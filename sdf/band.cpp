@@ -49,7 +49,8 @@ std::vector<FieldLeaf> find_band(const std::vector<Triangle>& triangles) {
         leaves.push_back(out);
     }
     std::sort(leaves.begin(), leaves.end(), [](const FieldLeaf& a, const FieldLeaf& b) {
-        return std::array{a.origin.x, a.origin.y, a.origin.z} < std::array{b.origin.x, b.origin.y, b.origin.z};
+        return std::array{a.origin.x, a.origin.y, a.origin.z} <
+               std::array{b.origin.x, b.origin.y, b.origin.z};
     });
     return leaves;
 }
@@ -75,8 +76,8 @@ bool LeafMap::interpolate(const glm::dvec3& point, double& result) const {
         const glm::ivec3 step(corner >> 2 & 1, corner >> 1 & 1, corner & 1);
         const float* sample = value(cell + step);
         if (!sample) return false;
-        result += *sample * (step.x ? u.x : 1.0 - u.x) * (step.y ? u.y : 1.0 - u.y) *
-                  (step.z ? u.z : 1.0 - u.z);
+        result +=
+            *sample * (step.x ? u.x : 1.0 - u.x) * (step.y ? u.y : 1.0 - u.y) * (step.z ? u.z : 1.0 - u.z);
     }
     return true;
 }

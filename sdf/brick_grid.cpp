@@ -62,16 +62,18 @@ BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), inflated_(f
         if (occupied[i].none()) continue;
         for (int cell = 0; cell < kLeafSize; ++cell) {
             if (!occupied[i][static_cast<std::size_t>(cell)]) continue;
-            cells.include(
-                glm::dvec3(field.leaves[i].origin + glm::ivec3(cell / 64, cell / 8 % 8, cell % 8)));
+            cells.include(glm::dvec3(field.leaves[i].origin + glm::ivec3(cell / 64, cell / 8 % 8, cell % 8)));
         }
     }
     if (cells.empty()) return;
-    const glm::ivec3 first(cells.minimum);
-    occupied_voxels_.include(glm::dvec3(0.0));
-    occupied_voxels_.include(cells.maximum - cells.minimum + 1.0);
+    // One more cell on every side: a surface may lie in the very faces of its cells, and a ray must see the
+    // sign before it.
+    const glm::ivec3 first = glm::ivec3(cells.minimum) - 1;
+    const glm::ivec3 cell_count = glm::ivec3(cells.maximum) + 2 - first;
+    traced_voxels_.include(glm::dvec3(0.0));
+    traced_voxels_.include(glm::dvec3(cell_count));
     origin_ = info_.origin + info_.voxel_size * glm::dvec3(first);
-    block_count_ = glm::ivec3(cells.maximum - cells.minimum) / kBrickCells + 1;
+    block_count_ = (cell_count + kBrickCells - 1) / kBrickCells;
     top_.assign(static_cast<std::size_t>(block_count_.x) * block_count_.y * block_count_.z, -1);
 
     std::vector<glm::ivec3> blocks;
@@ -162,9 +164,9 @@ void BrickGrid::fill_empty_distances() {
 
 core::DoubleBounds BrickGrid::local_bounds() const {
     core::DoubleBounds result;
-    if (occupied_voxels_.empty()) return result;
-    result.include(origin_ + info_.voxel_size * occupied_voxels_.minimum);
-    result.include(origin_ + info_.voxel_size * occupied_voxels_.maximum);
+    if (traced_voxels_.empty()) return result;
+    result.include(origin_ + info_.voxel_size * traced_voxels_.minimum);
+    result.include(origin_ + info_.voxel_size * traced_voxels_.maximum);
     return result;
 }
 

@@ -46,8 +46,9 @@ public:
     const glm::dvec3& origin() const { return origin_; }
     const glm::ivec3& block_count() const { return block_count_; }
 
-    /// Box round all occupied cells, in voxels; empty if the field has no surface.
-    const core::DoubleBounds& occupied_voxels() const { return occupied_voxels_; }
+    /// Box that holds all occupied cells with one more on every side, in voxels; empty if the field has no
+    /// surface.
+    const core::DoubleBounds& traced_voxels() const { return traced_voxels_; }
     /// The same in local units.
     core::DoubleBounds local_bounds() const;
 
@@ -82,7 +83,7 @@ private:
     FieldInfo info_;
     glm::dvec3 origin_{0.0};
     glm::ivec3 block_count_{0};
-    core::DoubleBounds occupied_voxels_;
+    core::DoubleBounds traced_voxels_;
     std::vector<std::int32_t> top_;
     std::vector<Brick> bricks_;
     std::vector<std::uint8_t> inflated_;

@@ -48,8 +48,7 @@ bool is_usable(const glm::vec3& p) {
 bool has_area(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     // Positions are floats, so that collinear ones give exactly 0 in double or close to it.
-    const double longest =
-        std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)});
+    const double longest = std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)});
     return glm::length(normal) > 1e-14 * longest;
 }
 
@@ -177,8 +176,7 @@ bool encloses_volume(const std::vector<Triangle>& triangles) {
     std::iota(all.begin(), all.end(), 0u);
     const TriangleBvh tree(triangles, all);
     const WindingNumber fast(tree);
-    const double beta =
-        triangles.size() <= kFewTriangles ? std::numeric_limits<double>::infinity() : 2.0;
+    const double beta = triangles.size() <= kFewTriangles ? std::numeric_limits<double>::infinity() : 2.0;
     std::size_t clear = 0;
     for (const SurfaceSample& sample : samples) {
         const double front = std::abs(fast.at(sample.position + kOffsetVoxels * sample.normal, beta));

@@ -13,14 +13,15 @@ namespace sdf {
 
 /// Welded, non-degenerate, distinct triangles.
 struct CleanMesh {
-    std::vector<glm::dvec3> vertices;           ///< Distinct, local units.
-    std::vector<glm::uvec3> triangles;          ///< Indices into `vertices`.
-    std::vector<std::uint32_t> source_triangle; ///< Of each triangle, ascending.
-    core::DoubleBounds bounds;                  ///< Over the triangles.
-    std::uint32_t out_of_range_count = 0;       ///< Dropped: an index beyond the positions.
-    std::uint32_t not_finite_count = 0;         ///< Dropped: a NaN, infinite or absurd (> 1e30) coordinate.
-    std::uint32_t zero_area_count = 0;          ///< Dropped: no area.
-    std::uint32_t duplicate_count = 0;  ///< Dropped: the same three vertices as an earlier face, however wound.
+    std::vector<glm::dvec3> vertices;            ///< Distinct, local units.
+    std::vector<glm::uvec3> triangles;           ///< Indices into `vertices`.
+    std::vector<std::uint32_t> source_triangle;  ///< Of each triangle, ascending.
+    core::DoubleBounds bounds;                   ///< Over the triangles.
+    std::uint32_t out_of_range_count = 0;        ///< Dropped: an index beyond the positions.
+    std::uint32_t not_finite_count = 0;          ///< Dropped: a NaN, infinite or absurd (> 1e30) coordinate.
+    std::uint32_t zero_area_count = 0;           ///< Dropped: no area.
+    std::uint32_t duplicate_count =
+        0;  ///< Dropped: the same three vertices as an earlier face, however wound.
 
     std::uint32_t dropped_count() const {
         return out_of_range_count + not_finite_count + zero_area_count + duplicate_count;

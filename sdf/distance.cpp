@@ -29,7 +29,7 @@ std::optional<float> sample_at(const BrickGrid& grid, const glm::ivec3& sample) 
 }
 
 std::optional<double> distance_at(const BrickGrid& grid, const glm::dvec3& point) {
-    const core::DoubleBounds& box = grid.occupied_voxels();
+    const core::DoubleBounds& box = grid.traced_voxels();
     for (int axis = 0; axis < 3; ++axis) {
         if (!(point[axis] >= box.minimum[axis] && point[axis] <= box.maximum[axis])) return std::nullopt;
     }
@@ -68,8 +68,8 @@ glm::dvec3 smooth_gradient(const BrickGrid& grid, const glm::ivec3& cell, const 
     glm::dvec3 gradient(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         const glm::ivec3 step(corner >> 2 & 1, corner >> 1 & 1, corner & 1);
-        const double weight = (step.x ? u.x : 1.0 - u.x) * (step.y ? u.y : 1.0 - u.y) *
-                              (step.z ? u.z : 1.0 - u.z);
+        const double weight =
+            (step.x ? u.x : 1.0 - u.x) * (step.y ? u.y : 1.0 - u.y) * (step.z ? u.z : 1.0 - u.z);
         for (int axis = 0; axis < 3; ++axis) {
             glm::ivec3 low = step + 1, high = step + 1;
             low[axis] -= 1;

@@ -46,7 +46,8 @@ private:
 inline glm::dvec3 finite_inverse(const glm::dvec3& direction) {
     constexpr double kHuge = 1e200;
     glm::dvec3 inverse;
-    for (int axis = 0; axis < 3; ++axis) inverse[axis] = direction[axis] == 0.0 ? kHuge : 1.0 / direction[axis];
+    for (int axis = 0; axis < 3; ++axis)
+        inverse[axis] = direction[axis] == 0.0 ? kHuge : 1.0 / direction[axis];
     return inverse;
 }
 

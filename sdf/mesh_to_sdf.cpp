@@ -9,8 +9,8 @@
 
 #include "core/support/error.h"
 #include "core/support/parallel.h"
-#include "sdf/band.h"
 #include "sdf/bake_error.h"
+#include "sdf/band.h"
 #include "sdf/clean_mesh.h"
 #include "sdf/thin_walls.h"
 #include "sdf/triangle_bvh.h"
@@ -36,7 +36,9 @@ struct Sources {
 std::vector<Triangle> corners_in_voxels(const CleanMesh& mesh, const glm::dvec3& origin, double voxel_size) {
     std::vector<Triangle> corners;
     corners.reserve(mesh.triangles.size());
-    const auto to_voxels = [&](std::uint32_t vertex) { return (mesh.vertices[vertex] - origin) / voxel_size; };
+    const auto to_voxels = [&](std::uint32_t vertex) {
+        return (mesh.vertices[vertex] - origin) / voxel_size;
+    };
     for (const glm::uvec3& triangle : mesh.triangles) {
         corners.push_back({to_voxels(triangle.x), to_voxels(triangle.y), to_voxels(triangle.z)});
     }
@@ -114,7 +116,7 @@ void find_signs(const Sources& sources, const FieldLeaf& leaf, const LeafDistanc
     if (!sources.has_solids) return;
     const auto ask = [&](int i) {
         return sources.winding->is_inside(glm::dvec3(sample_position(leaf, i))) ? std::uint8_t{1}
-                                                                               : std::uint8_t{0};
+                                                                                : std::uint8_t{0};
     };
     if (!sources.solids_are_closed) {
         for (int i = 0; i < kSampleCount; ++i) {
@@ -222,7 +224,8 @@ void to_local_units(const CleanMesh& mesh, double voxel_size, std::vector<FieldL
 
 void describe_drops(const CleanMesh& mesh, std::vector<std::string>& warnings) {
     const auto say = [&](std::uint32_t count, const char* what) {
-        if (count > 0) warnings.push_back(fmt::format("{} face{} dropped: {}", count, count == 1 ? "" : "s", what));
+        if (count > 0)
+            warnings.push_back(fmt::format("{} face{} dropped: {}", count, count == 1 ? "" : "s", what));
     };
     say(mesh.out_of_range_count, "an index beyond the mesh's positions");
     say(mesh.not_finite_count, "a coordinate that is not finite");
@@ -251,19 +254,21 @@ glm::dvec3 usable_extent(const MeshView& mesh) {
 SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
     const CleanMesh clean = clean_mesh(mesh);
     if (clean.triangles.empty()) {
-        throw core::InputError(core::ErrorKind::kBadData,
-                               fmt::format("none of its {} faces can be baked; at least one needs an area and "
-                                           "finite coordinates",
-                                           mesh.triangles.size()));
+        throw core::InputError(
+            core::ErrorKind::kBadData,
+            fmt::format("none of its {} faces can be baked; at least one needs an area and "
+                        "finite coordinates",
+                        mesh.triangles.size()));
     }
     const double h = options.voxel_size;
     const glm::dvec3 extent = clean.bounds.extent();
     const double longest = std::max({extent.x, extent.y, extent.z});
     if (!(h > 0.0) || !std::isfinite(h) || !(longest / h <= kMostVoxelsAlongSide)) {
-        throw core::InputError(core::ErrorKind::kBadData,
-                               fmt::format("a voxel of {:g} gives {:g} voxels along its longest side; at most "
-                                           "{} can be baked",
-                                           h, longest / h, kMostVoxelsAlongSide));
+        throw core::InputError(
+            core::ErrorKind::kBadData,
+            fmt::format("a voxel of {:g} gives {:g} voxels along its longest side; at most "
+                        "{} can be baked",
+                        h, longest / h, kMostVoxelsAlongSide));
     }
 
     SampledField field;
@@ -298,17 +303,19 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
             thicken(walls, field.leaves);
             for (const std::uint32_t triangle : walls.triangle_of_piece) inflated_clean[triangle] = 1;
             const double wanted = 2.0 * longest / (walls.thickness * h);
-            info.warnings.push_back(fmt::format(
-                "{:.1f} % of the surface bounds walls too thin for the voxel of {:g} and is thickened by {:g} on "
-                "each side; walls are {:g} thick, which --resolution {:.0f} would hold",
-                100.0 * walls.area_fraction, h, kHalfThicknessVoxels * h, walls.thickness * h,
-                std::ceil(wanted)));
+            info.warnings.push_back(
+                fmt::format("{:.1f} % of the surface bounds walls too thin for the voxel of {:g} and is "
+                            "thickened by {:g} on "
+                            "each side; walls are {:g} thick, which --resolution {:.0f} would hold",
+                            100.0 * walls.area_fraction, h, kHalfThicknessVoxels * h, walls.thickness * h,
+                            std::ceil(wanted)));
         }
     }
     info.half_thickness = sources.has_sheets || has_thin_walls ? kHalfThicknessVoxels * h : 0.0;
     info.clean_level_set =
         sources.has_solids && !sources.has_sheets && sources.solids_are_closed && !has_thin_walls;
-    info.error_voxels = measure_error(sources.corners, inflated_clean, *sources.winding, LeafMap(field.leaves));
+    info.error_voxels =
+        measure_error(sources.corners, inflated_clean, *sources.winding, LeafMap(field.leaves));
 
     if (info.half_thickness > 0.0) {
         field.inflated.assign(mesh.triangles.size(), 0);

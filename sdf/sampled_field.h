@@ -48,10 +48,10 @@ struct ErrorFigures {
 /// What is known of a baked field besides its samples; the .vdb's metadata.
 struct FieldInfo {
     MeshClass mesh_class = MeshClass::kSolid;
-    double voxel_size = 0.0;        ///< h, local units.
-    glm::dvec3 origin{0.0};         ///< Local position of lattice point (0, 0, 0).
-    double half_thickness = 0.0;    ///< tau, local units; 0 where nothing is inflated.
-    bool clean_level_set = false;   ///< Closed, signed, nothing inflated: a level set in OpenVDB's sense.
+    double voxel_size = 0.0;           ///< h, local units.
+    glm::dvec3 origin{0.0};            ///< Local position of lattice point (0, 0, 0).
+    double half_thickness = 0.0;       ///< tau, local units; 0 where nothing is inflated.
+    bool clean_level_set = false;      ///< Closed, signed, nothing inflated: a level set in OpenVDB's sense.
     std::uint32_t triangle_count = 0;  ///< Of the source mesh.
     std::uint32_t dropped_faces = 0;   ///< Faces the bake could not use.
     ErrorFigures error_voxels;         ///< Mesh -> field; on inflated features beyond the half-thickness.
@@ -62,8 +62,8 @@ struct FieldInfo {
 
 /// 8^3 samples; x runs slowest, z fastest, as in OpenVDB's leaves.
 struct FieldLeaf {
-    glm::ivec3 origin{0};  ///< Lattice coordinates of the first sample, multiples of 8.
-    std::array<float, kLeafSize> distance{};         ///< Local units, negative inside.
+    glm::ivec3 origin{0};                     ///< Lattice coordinates of the first sample, multiples of 8.
+    std::array<float, kLeafSize> distance{};  ///< Local units, negative inside.
     std::array<std::int32_t, kLeafSize> triangle{};  ///< Closest source triangle; -1 where inactive.
     std::array<std::uint64_t, kLeafSize / 64> active{};
 

@@ -83,7 +83,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
     for (std::size_t i = 0; i < scene.instances.size(); ++i) {
         const core::Instance& instance = scene.instances[i];
         const BrickGrid* grid = grids_[instance.mesh].get();
-        if (!grid || grid->occupied_voxels().empty()) continue;
+        if (!grid || grid->traced_voxels().empty()) continue;
         const double h = grid->voxel_size();
         PlacedGrid& placed = placed_[i];
         placed.grid = grid;
@@ -121,8 +121,8 @@ bool SdfTracer::resolve(const LocalRay& ray, const Crossing& crossing, Nearest& 
     TrianglePoint nearest_point;
     for (std::size_t i = 0; i < 8; ++i) {
         const std::int32_t candidate = candidates[i];
-        if (candidate < 0 || std::find(candidates.begin(), candidates.begin() + i, candidate) !=
-                                 candidates.begin() + i) {
+        if (candidate < 0 ||
+            std::find(candidates.begin(), candidates.begin() + i, candidate) != candidates.begin() + i) {
             continue;
         }
         const TrianglePoint closest =
@@ -155,8 +155,8 @@ bool SdfTracer::resolve(const LocalRay& ray, const Crossing& crossing, Nearest& 
         }
     }
     found.barycentrics = nearest_point.barycentrics;
-    if (has_alpha_ && !core::is_visible(scene_, ray.instance, index, glm::vec2(found.barycentrics),
-                                        ray.world.seed)) {
+    if (has_alpha_ &&
+        !core::is_visible(scene_, ray.instance, index, glm::vec2(found.barycentrics), ray.world.seed)) {
         return false;
     }
     found.t = crossing.t;
@@ -177,7 +177,7 @@ void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nea
                    placed.voxel_from_world_direction * glm::dvec3(ray.origin) + placed.voxel_origin,
                    placed.voxel_from_world_direction * glm::dvec3(ray.direction)};
     double t_min = ray.t_min, t_max = nearest.t;
-    if (!clip_to_box(placed.grid->occupied_voxels(), local.origin, finite_inverse(local.direction), t_min,
+    if (!clip_to_box(placed.grid->traced_voxels(), local.origin, finite_inverse(local.direction), t_min,
                      t_max)) {
         return;
     }
@@ -231,8 +231,8 @@ core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const 
     const double magnitude = std::max({glm::length(position), glm::length(origin), nearest.t});
     double clearance_voxels = 2.0 * kTraceErrorVoxels;
     if (nearest.is_shell) clearance_voxels = grid.half_thickness_voxels() + kShellClearanceVoxels;
-    hit.offset = static_cast<float>(
-        std::max(clearance_voxels * placed.world_from_voxel_scale, four_ulp(magnitude)));
+    hit.offset =
+        static_cast<float>(std::max(clearance_voxels * placed.world_from_voxel_scale, four_ulp(magnitude)));
     return hit;
 }
 

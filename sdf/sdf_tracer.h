@@ -51,7 +51,7 @@ private:
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
         glm::dmat3 voxel_from_world_direction{1.0};
-        glm::dvec3 voxel_origin{0.0};  ///< Voxel coordinates of the world's origin.
+        glm::dvec3 voxel_origin{0.0};         ///< Voxel coordinates of the world's origin.
         double world_from_voxel_scale = 1.0;  ///< Largest stretch of one voxel, in world units.
         float start_offset = 0.0f;
     };

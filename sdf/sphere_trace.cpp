@@ -81,9 +81,13 @@ struct Cubic {
 
 RayMarch::RayMarch(const BrickGrid& grid, const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
                    double t_max)
-    : grid_(grid), origin_(origin), direction_(direction), inverse_(finite_inverse(direction)), t_end_(t_max) {
-    cell_limit_ = glm::ivec3(grid.occupied_voxels().empty() ? glm::dvec3(0.0)
-                                                            : grid.occupied_voxels().maximum);
+    : grid_(grid),
+      origin_(origin),
+      direction_(direction),
+      inverse_(finite_inverse(direction)),
+      t_end_(t_max) {
+    cell_limit_ =
+        glm::ivec3(grid.traced_voxels().empty() ? glm::dvec3(0.0) : grid.traced_voxels().maximum);
     is_done_ = !(t_min <= t_max) || cell_limit_.x == 0;
     if (is_done_) return;
     speed_ = glm::length(direction);
@@ -102,9 +106,8 @@ void RayMarch::enter_cell(double t) {
 
 void RayMarch::update_next_planes() {
     for (int axis = 0; axis < 3; ++axis) {
-        next_plane_t_[axis] = step_[axis] == 0
-                                  ? kInfinity
-                                  : (cell_[axis] + (step_[axis] > 0) - origin_[axis]) * inverse_[axis];
+        next_plane_t_[axis] =
+            step_[axis] == 0 ? kInfinity : (cell_[axis] + (step_[axis] > 0) - origin_[axis]) * inverse_[axis];
     }
 }
 

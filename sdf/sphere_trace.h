@@ -16,9 +16,9 @@ namespace sdf {
 
 /// A place where the field changes sign along a ray.
 struct Crossing {
-    double t = 0.0;        ///< Ray parameter.
-    glm::ivec3 cell{0};    ///< Voxel coordinates of the cell's lowest corner.
-    glm::dvec3 point{0.0}; ///< Position within the cell, each coordinate in [0, 1].
+    double t = 0.0;         ///< Ray parameter.
+    glm::ivec3 cell{0};     ///< Voxel coordinates of the cell's lowest corner.
+    glm::dvec3 point{0.0};  ///< Position within the cell, each coordinate in [0, 1].
     std::int32_t brick = 0;
     bool enters_negative = true;  ///< From positive to negative values.
 };
@@ -28,7 +28,7 @@ struct Crossing {
 class RayMarch {
 public:
     /// @param origin, direction in voxel coordinates; the direction has any length but 0
-    /// @param t_min, t_max the part of the ray that counts, already clipped to the grid's occupied box
+    /// @param t_min, t_max the part of the ray that counts, already clipped to the grid's traced box
     RayMarch(const BrickGrid& grid, const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
              double t_max);
 
@@ -37,7 +37,8 @@ public:
 
     /// Cells and empty blocks visited so far.
     std::uint32_t steps() const { return steps_; }
-    /// Whether the walk was given up at the step cap: twice the cells that a straight line can cross, and 256.
+    /// Whether the walk was given up at the step cap: twice the cells that a straight line can cross, and
+    /// 256.
     bool is_exhausted() const { return steps_ >= step_cap_; }
 
 private:
@@ -62,8 +63,8 @@ private:
     double speed_ = 1.0;  ///< Voxels a unit of t.
     double t_ = 0.0;      ///< Where the ray entered cell_.
     double t_end_ = 0.0;
-    int entry_axis_ = -1;            ///< Axis of the face it came through; -1 if it starts within the cell.
-    double resume_from_ = -1.0;      ///< Part of the cell's segment already searched; < 0: none.
+    int entry_axis_ = -1;           ///< Axis of the face it came through; -1 if it starts within the cell.
+    double resume_from_ = -1.0;     ///< Part of the cell's segment already searched; < 0: none.
     bool resume_negative_ = false;  ///< Sign just after the last crossing in this cell.
     bool is_done_ = false;
     std::uint32_t steps_ = 0;

@@ -15,10 +15,10 @@ namespace sdf {
 
 /// Small pieces of triangles that bound walls which the field does not show.
 struct ThinWalls {
-    std::vector<Triangle> pieces;                 ///< Voxel units, edges of about a voxel.
-    std::vector<std::uint32_t> triangle_of_piece; ///< The clean triangle each was cut from.
-    double area_fraction = 0.0;                   ///< Of all solid triangles' area.
-    double thickness = 0.0;                       ///< Of the 10th percentile of those walls, in voxels.
+    std::vector<Triangle> pieces;                  ///< Voxel units, edges of about a voxel.
+    std::vector<std::uint32_t> triangle_of_piece;  ///< The clean triangle each was cut from.
+    double area_fraction = 0.0;                    ///< Of all solid triangles' area.
+    double thickness = 0.0;                        ///< Of the 10th percentile of those walls, in voxels.
 };
 
 /// @param corners the clean triangles in voxels; @param components their classes.

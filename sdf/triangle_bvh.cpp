@@ -8,8 +8,7 @@ namespace sdf {
 namespace {
 
 double squared_distance(const core::DoubleBounds& box, const glm::dvec3& point) {
-    const glm::dvec3 outside =
-        glm::max(glm::max(box.minimum - point, point - box.maximum), glm::dvec3(0.0));
+    const glm::dvec3 outside = glm::max(glm::max(box.minimum - point, point - box.maximum), glm::dvec3(0.0));
     return glm::dot(outside, outside);
 }
 
@@ -159,8 +158,7 @@ double TriangleBvh::nearest_crossing(const glm::dvec3& origin, const glm::dvec3&
         bool missed = false;
         for (int axis = 0; axis < 3 && !missed; ++axis) {
             if (direction[axis] == 0.0) {
-                missed =
-                    origin[axis] < node.box.minimum[axis] || origin[axis] > node.box.maximum[axis];
+                missed = origin[axis] < node.box.minimum[axis] || origin[axis] > node.box.maximum[axis];
                 continue;
             }
             const double a = (node.box.minimum[axis] - origin[axis]) / direction[axis];

@@ -175,7 +175,9 @@ public:
     template <typename T>
     T get(const char* name) const {
         const auto found = metadata_.getMetadata<openvdb::TypedMetadata<T>>(name);
-        if (!found) fail(path_, fmt::format("grid '{}' has no metadata '{}'; bake the mesh again", kDistanceGrid, name));
+        if (!found)
+            fail(path_,
+                 fmt::format("grid '{}' has no metadata '{}'; bake the mesh again", kDistanceGrid, name));
         return found->value();
     }
     double finite(const char* name) const {
@@ -263,8 +265,8 @@ FieldLeaf read_leaf(const fs::path& path, const openvdb::FloatTree::LeafNodeType
     leaf.origin = {origin.x(), origin.y(), origin.z()};
     for (int axis = 0; axis < 3; ++axis) {
         if (std::abs(leaf.origin[axis]) > kFarthestLattice) {
-            fail(path, fmt::format("has samples at lattice coordinate {}; at most {} can be", leaf.origin[axis],
-                                   kFarthestLattice));
+            fail(path, fmt::format("has samples at lattice coordinate {}; at most {} can be",
+                                   leaf.origin[axis], kFarthestLattice));
         }
     }
     const auto* triangle_leaf = triangles.probeConstLeaf(origin);
@@ -310,8 +312,7 @@ SampledField read_field(const fs::path& path) {
             return std::array{a.origin.x, a.origin.y, a.origin.z} <
                    std::array{b.origin.x, b.origin.y, b.origin.z};
         });
-        const auto ranges =
-            MetadataReader(path, *distance).get<std::string>("fieldlight_inflated_triangles");
+        const auto ranges = MetadataReader(path, *distance).get<std::string>("fieldlight_inflated_triangles");
         if (!parse_inflated_ranges(ranges, field.info.triangle_count, field.inflated)) {
             fail(path, "metadata 'fieldlight_inflated_triangles' is no list of ranges of triangles");
         }
@@ -351,7 +352,8 @@ std::uint64_t count_nan(const Grid& grid) {
 
 std::uint64_t count_nan(const openvdb::GridBase& grid) {
     std::uint64_t count = 0;
-    grid.apply<openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Vec3SGrid, openvdb::Vec3DGrid>>(
+    grid.apply<
+        openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Vec3SGrid, openvdb::Vec3DGrid>>(
         [&](const auto& typed) { count = count_nan(typed); });
     return count;
 }

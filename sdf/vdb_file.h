@@ -1,8 +1,8 @@
 // sdf/vdb_file.h: baked fields on disk: one .vdb a mesh, readable by other programs.
 //
 // Grid "distance" holds the samples (class level set only where it is one: closed, signed, nothing
-// inflated), grid "triangle" each active sample's closest source triangle. Everything of FieldInfo is metadata
-// of "distance", under names that start with `fieldlight_`. The same field gives the same bytes.
+// inflated), grid "triangle" each active sample's closest source triangle. Everything of FieldInfo is
+// metadata of "distance", under names that start with `fieldlight_`. The same field gives the same bytes.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,8 @@ void write_field(const std::filesystem::path& path, const SampledField& field, c
 /// that the mesh has not, or absurd sizes.
 SampledField read_field(const std::filesystem::path& path);
 
-/// What decides whether a bake can be used again, or nothing if the file holds none of this program's version.
+/// What decides whether a bake can be used again, or nothing if the file holds none of this program's
+/// version.
 struct BakeKey {
     std::string source_hash;
     std::string settings_hash;
@@ -44,7 +45,7 @@ struct VdbGridSummary {
     std::string type;
     std::string grid_class;
     glm::dvec3 voxel_size{0.0};
-    bool has_voxels = false;  ///< Whether any voxel is active; else the bounds mean nothing.
+    bool has_voxels = false;                ///< Whether any voxel is active; else the bounds mean nothing.
     glm::dvec3 minimum{0.0}, maximum{0.0};  ///< World positions of the outermost active voxels.
     std::uint64_t active_voxels = 0;
     std::uint64_t bytes = 0;

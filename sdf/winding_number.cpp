@@ -98,13 +98,15 @@ double WindingNumber::expand(const Moments& m, const glm::dvec3& point) {
     const double x = r.x, y = r.y, z = r.z;
     const auto& q = m.quadrupole;
     const auto& o = m.octupole;
-    const double quadratic = q[0] * x * x + q[1] * y * y + q[2] * z * z + q[3] * x * y + q[4] * x * z + q[5] * y * z;
+    const double quadratic =
+        q[0] * x * x + q[1] * y * y + q[2] * z * z + q[3] * x * y + q[4] * x * z + q[5] * y * z;
     const double cubic = o[0] * x * x * x + o[1] * y * y * y + o[2] * z * z * z + o[3] * x * x * y +
                          o[4] * x * x * z + o[5] * x * y * y + o[6] * y * y * z + o[7] * x * z * z +
                          o[8] * y * z * z + o[9] * x * y * z;
     const double first = glm::dot(m.dipole, r);
     const double second = m.trace - 3.0 * quadratic * inverse2;
-    const double third = -3.0 * glm::dot(m.octupole_vector, r) * inverse2 + 15.0 * cubic * inverse2 * inverse2;
+    const double third =
+        -3.0 * glm::dot(m.octupole_vector, r) * inverse2 + 15.0 * cubic * inverse2 * inverse2;
     return kInverseFourPi * inverse3 * (first + second + third);
 }
 

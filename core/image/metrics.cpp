@@ -51,26 +51,27 @@ LeakMetric measure_leak(std::span<const glm::vec3> test, std::span<const glm::ve
         threshold = kDarkShare * *middle;
     }
     LeakMetric leak;
-    std::vector<double> leaked;
-    double leaked_sum = 0.0, lit_sum = 0.0, lit_reference_sum = 0.0;
+    std::vector<double> dark;
+    double leaked_sum = 0.0, dark_sum = 0.0, lit_sum = 0.0, lit_reference_sum = 0.0;
     for (std::size_t i = 0; i < test.size(); ++i) {
         const double y = luminance_of(test[i]), y_reference = luminance_of(reference[i]);
         if (y_reference <= threshold) {
-            leaked.push_back(y);
-            leaked_sum += y;
+            dark.push_back(y);
+            dark_sum += y;
+            leaked_sum += std::max(y - y_reference, 0.0);
         } else {
             lit_sum += y;
             lit_reference_sum += y_reference;
         }
     }
-    leak.dark_pixels = leaked.size();
+    leak.dark_pixels = dark.size();
     leak.energy_fraction = reference_sum == 0.0 ? kNaN : leaked_sum / reference_sum;
-    if (!leaked.empty()) {
-        leak.mean = leaked_sum / static_cast<double>(leaked.size());
-        std::sort(leaked.begin(), leaked.end());
-        leak.p99_9 = percentile(leaked, 99.9);
+    if (!dark.empty()) {
+        leak.mean = dark_sum / static_cast<double>(dark.size());
+        std::sort(dark.begin(), dark.end());
+        leak.p99_9 = percentile(dark, 99.9);
     }
-    leak.lit_bias_percent = leaked.size() == test.size() ? kNaN : percent_beyond(lit_sum, lit_reference_sum);
+    leak.lit_bias_percent = dark.size() == test.size() ? kNaN : percent_beyond(lit_sum, lit_reference_sum);
     leak.counts = std::abs(leak.lit_bias_percent) <= kLitTolerancePercent;
     return leak;
 }

@@ -15,8 +15,8 @@ namespace core {
 /// Light where the reference has none. Dark pixels: Y_R <= 1e-4 x median of Y_R over pixels with Y_R > 0 (the
 /// upper median); where the reference is black everywhere, all pixels are dark.
 struct LeakMetric {
-    double energy_fraction =
-        0.0;             ///< Sum of Y_I over dark pixels / sum of Y_R; NaN beside a black reference.
+    /// Sum of max(Y_I - Y_R, 0) over dark pixels / sum of Y_R over all; NaN beside a black reference.
+    double energy_fraction = 0.0;
     double mean = 0.0;   ///< Mean Y_I over dark pixels; 0 where there are none.
     double p99_9 = 0.0;  ///< 99.9th percentile of Y_I over dark pixels.
     std::size_t dark_pixels = 0;

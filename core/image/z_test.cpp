@@ -109,6 +109,7 @@ double block_p_value(const BlockSums& sums, const ZTestOptions& options) {
     const double floor = std::max(options.absolute_floor,
                                   options.relative_floor * std::max(std::abs(test), std::abs(reference)));
     const double standard_error = std::max(std::sqrt(sums.variance) / count, floor);
+    if (!std::isfinite(standard_error)) return std::numeric_limits<double>::quiet_NaN();
     // Welch and Satterthwaite: between the degrees of one variance, where one dominates, and the sum of all.
     // A single pixel keeps those of one: its two variances are too few to be told apart by their estimates.
     const bool welch = sums.pixel_count > 1 && sums.squared_variance > 0.0;

@@ -67,8 +67,15 @@ glm::vec2 SampleSequence::point(std::uint32_t dimension) const {
     return {unit_float(x), unit_float(y)};
 }
 
+glm::vec2 SampleSequence::independent_point(std::uint32_t dimension) const {
+    const std::uint32_t first =
+        mix(mix(key_ + dimension * 0x9e3779b9u) ^ (index_ * 0x85ebca6bu + 0x27d4eb2fu));
+    const std::uint32_t second = mix(first ^ 0x6a09e667u);
+    return {unit_float(first), unit_float(second)};
+}
+
 std::uint32_t SampleSequence::bits(std::uint32_t dimension) const {
-    return hash_words(key_, index_, dimension, 0x5bd1e995u);
+    return mix(mix(key_ ^ (dimension * 0xc2b2ae35u)) + index_ * 0x9e3779b9u);
 }
 
 }  // namespace core

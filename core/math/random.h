@@ -28,8 +28,8 @@ public:
     /// the points of one dimension are a (0,2)-sequence in base 2.
     glm::vec2 point(std::uint32_t dimension) const;
 
-    /// One coordinate of a further dimension.
-    float value(std::uint32_t dimension) const { return point(dimension).x; }
+    /// Two independent uniform numbers in [0, 1): cheaper, and not stratified.
+    glm::vec2 independent_point(std::uint32_t dimension) const;
 
     /// 32 bits that no point uses, for hashes such as Ray::seed.
     std::uint32_t bits(std::uint32_t dimension) const;

@@ -7,6 +7,8 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <memory>
+#include <mutex>
 
 #include "core/math/random.h"
 #include "core/render/film.h"
@@ -27,6 +29,12 @@ constexpr int kPathsPerWave = 4096;
 /// Paths play roulette from this vertex on; before, the gain is smaller than the noise it adds.
 constexpr int kRouletteVertex = 3;
 constexpr float kMinimumSurvival = 0.05f;
+constexpr int kLongPathVertex = 16;
+constexpr float kLongPathSurvival = 0.95f;
+
+/// Later vertices take independent random numbers, which cost a third of the low-discrepancy points: after
+/// two scatterings their stratification no longer shows in the picture.
+constexpr int kStratifiedVertices = 2;
 
 /// Sobol dimensions by use, so that leaving one out shifts no other.
 enum Dimension : std::uint32_t { kFilm, kAlpha, kFirstVertex };
@@ -74,6 +82,16 @@ bool any_positive(const glm::vec3& v) {
     return v.x > 0.0f || v.y > 0.0f || v.z > 0.0f;
 }
 
+std::uint32_t vertex_dimension(int vertex, VertexDimension use) {
+    return kFirstVertex + static_cast<std::uint32_t>(vertex) * kDimensionsPerVertex + use;
+}
+
+glm::vec2 vertex_point(const Path& path, int vertex, VertexDimension use) {
+    const std::uint32_t dimension = vertex_dimension(vertex, use);
+    return vertex < kStratifiedVertices ? path.sequence.point(dimension)
+                                        : path.sequence.independent_point(dimension);
+}
+
 /// Everything that is the same for all tiles of a picture.
 class Job {
 public:
@@ -99,7 +117,7 @@ public:
 private:
     struct Wave;
 
-    void render_tile(int tile_x, int tile_y, int first_sample, int sample_count);
+    void render_tile(Wave& wave, int tile_x, int tile_y, int first_sample, int sample_count);
     void start_paths(Wave& wave, const std::vector<glm::ivec2>& pixels, int first_sample,
                      int sample_count) const;
     void shade(Wave& wave, int vertex) const;
@@ -107,10 +125,12 @@ private:
     void shade_emission(Path& path, const glm::vec3& emission, const Ray& ray, const Hit& hit,
                         int vertex) const;
     void sample_lights(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface,
-                       const glm::vec3& outgoing, const glm::vec3& origin, int vertex) const;
+                       const glm::vec3& outgoing, const glm::vec3& origin, int vertex, float u_group) const;
     bool scatter(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface, const glm::vec3& outgoing,
-                 const glm::vec3& origin, int vertex) const;
+                 const glm::vec3& origin, int vertex, float u_lobe) const;
     void resolve_shadows(Wave& wave, int vertex) const;
+    std::unique_ptr<Wave> take_wave();
+    void give_back(std::unique_ptr<Wave> wave);
     void count(Pass pass, Clock::time_point since, std::size_t rays);
 
     bool samples_lights() const { return settings_.light_sampling && !lights_.empty(); }
@@ -127,6 +147,8 @@ private:
     std::array<std::atomic<std::int64_t>, kPassCount> nanoseconds_{};
     std::array<std::atomic<std::uint64_t>, kPassCount> rays_{};
     std::atomic<std::uint64_t> exhausted_{0};
+    std::mutex spare_mutex_;
+    std::vector<std::unique_ptr<Wave>> spare_waves_;  ///< Kept, so that tiles do not wait for memory.
 };
 
 /// The paths of a tile that advance together, with the streams they share.
@@ -154,16 +176,31 @@ void Job::render_round(int first, int count) {
     parallel_for(static_cast<std::size_t>(tiles_x) * static_cast<std::size_t>(tiles_y), 1,
                  [&](std::size_t begin, std::size_t end) {
                      const ScopedFlushDenormals flush;
+                     std::unique_ptr<Wave> wave = take_wave();
                      for (std::size_t tile = begin; tile < end; ++tile) {
                          if (inputs_.stop_requested && inputs_.stop_requested()) throw Interrupted();
-                         render_tile(static_cast<int>(tile % static_cast<std::size_t>(tiles_x)),
+                         render_tile(*wave, static_cast<int>(tile % static_cast<std::size_t>(tiles_x)),
                                      static_cast<int>(tile / static_cast<std::size_t>(tiles_x)), first,
                                      count);
                      }
+                     give_back(std::move(wave));
                  });
 }
 
-void Job::render_tile(int tile_x, int tile_y, int first_sample, int sample_count) {
+std::unique_ptr<Job::Wave> Job::take_wave() {
+    const std::lock_guard lock(spare_mutex_);
+    if (spare_waves_.empty()) return std::make_unique<Wave>();
+    std::unique_ptr<Wave> wave = std::move(spare_waves_.back());
+    spare_waves_.pop_back();
+    return wave;
+}
+
+void Job::give_back(std::unique_ptr<Wave> wave) {
+    const std::lock_guard lock(spare_mutex_);
+    spare_waves_.push_back(std::move(wave));
+}
+
+void Job::render_tile(Wave& wave, int tile_x, int tile_y, int first_sample, int sample_count) {
     std::vector<glm::ivec2> pixels;  // Within the crop.
     for (int y = tile_y * kTileSize; y < std::min((tile_y + 1) * kTileSize, crop_.height); ++y) {
         for (int x = tile_x * kTileSize; x < std::min((tile_x + 1) * kTileSize, crop_.width); ++x) {
@@ -171,7 +208,6 @@ void Job::render_tile(int tile_x, int tile_y, int first_sample, int sample_count
         }
     }
 
-    Wave wave;
     start_paths(wave, pixels, first_sample, sample_count);
     for (int vertex = 0; !wave.active.empty(); ++vertex) {
         auto start = Clock::now();
@@ -190,6 +226,7 @@ void Job::render_tile(int tile_x, int tile_y, int first_sample, int sample_count
         std::swap(wave.active, wave.next_active);
     }
     exhausted_ += wave.exhausted;
+    wave.exhausted = 0;
 
     std::size_t path = 0;
     for (const glm::ivec2& pixel : pixels) {
@@ -204,7 +241,7 @@ void Job::render_tile(int tile_x, int tile_y, int first_sample, int sample_count
 void Job::start_paths(Wave& wave, const std::vector<glm::ivec2>& pixels, int first_sample,
                       int sample_count) const {
     const std::size_t path_count = pixels.size() * static_cast<std::size_t>(sample_count);
-    wave.paths.resize(path_count);
+    wave.paths.assign(path_count, Path{});
     wave.active.resize(path_count);
     wave.rays.resize(path_count);
     const auto seed_low = static_cast<std::uint32_t>(inputs_.seed);
@@ -263,8 +300,9 @@ void Job::shade(Wave& wave, int vertex) const {
             surface.origin_above(change_of_tracer ? start_offsets_[surface.instance] : 0.0f);
         const glm::vec3 outgoing = surface.frame.to_local(-ray.direction);
         path.receiver = {origin, surface.geometric_normal};
-        if (samples_lights()) sample_lights(wave, path_index, surface, outgoing, origin, vertex);
-        if (scatter(wave, path_index, surface, outgoing, origin, vertex)) {
+        const glm::vec2 choices = vertex_point(path, vertex, kChoices);
+        if (samples_lights()) sample_lights(wave, path_index, surface, outgoing, origin, vertex, choices.x);
+        if (scatter(wave, path_index, surface, outgoing, origin, vertex, choices.y)) {
             wave.next_active.push_back(path_index);
         }
     }
@@ -294,13 +332,11 @@ void Job::shade_emission(Path& path, const glm::vec3& emission, const Ray& ray, 
 }
 
 void Job::sample_lights(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface,
-                        const glm::vec3& outgoing, const glm::vec3& origin, int vertex) const {
+                        const glm::vec3& outgoing, const glm::vec3& origin, int vertex, float u_group) const {
     Path& path = wave.paths[path_index];
     path.selection = lights_.selection(path.receiver);
-    const std::uint32_t dimension = kFirstVertex + static_cast<std::uint32_t>(vertex) * kDimensionsPerVertex;
     const LightSampler::Sample light =
-        lights_.sample(path.receiver, path.selection, path.sequence.point(dimension + kChoices).x,
-                       path.sequence.point(dimension + kLightPoint));
+        lights_.sample(path.receiver, path.selection, u_group, vertex_point(path, vertex, kLightPoint));
     if (!(light.pdf > 0.0f) || !any_positive(light.radiance) ||
         !(glm::dot(light.direction, surface.geometric_normal) > 0.0f)) {
         return;
@@ -322,17 +358,16 @@ void Job::sample_lights(Wave& wave, std::uint32_t path_index, const SurfacePoint
     ray.direction = light.direction;
     ray.t_max = light.distance - stop_short;
     if (!(ray.t_max > 0.0f)) return;
-    ray.seed = path.sequence.bits(dimension + kAlphaShadow);
+    ray.seed = path.sequence.bits(vertex_dimension(vertex, kAlphaShadow));
     wave.shadow_rays.set(wave.pending.size(), ray);
     wave.pending.push_back({path_index, arriving});
 }
 
 bool Job::scatter(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface,
-                  const glm::vec3& outgoing, const glm::vec3& origin, int vertex) const {
+                  const glm::vec3& outgoing, const glm::vec3& origin, int vertex, float u_lobe) const {
     Path& path = wave.paths[path_index];
-    const std::uint32_t dimension = kFirstVertex + static_cast<std::uint32_t>(vertex) * kDimensionsPerVertex;
-    const BrdfSample scattered = sample(surface.brdf, outgoing, path.sequence.point(dimension + kChoices).y,
-                                        path.sequence.point(dimension + kDirection));
+    const BrdfSample scattered =
+        sample(surface.brdf, outgoing, u_lobe, vertex_point(path, vertex, kDirection));
     if (!(scattered.pdf > 0.0f)) return false;
     const glm::vec3 direction = glm::normalize(surface.frame.to_world(scattered.incoming));
     if (!(glm::dot(direction, surface.geometric_normal) > 0.0f)) return false;
@@ -348,15 +383,17 @@ bool Job::scatter(Wave& wave, std::uint32_t path_index, const SurfacePoint& surf
     if (vertex >= kRouletteVertex) {
         // Throughput alone decides, never the light: brighter lights must not change which paths live.
         const float brightest = std::max({path.throughput.x, path.throughput.y, path.throughput.z});
-        const float survival = std::clamp(brightest, kMinimumSurvival, 1.0f);
-        if (path.sequence.value(dimension + kRoulette) >= survival) return false;
+        // Long paths die even where nothing is absorbed, or a white furnace would never end.
+        const float most = vertex < kLongPathVertex ? 1.0f : kLongPathSurvival;
+        const float survival = std::clamp(brightest, kMinimumSurvival, most);
+        if (vertex_point(path, vertex, kRoulette).x >= survival) return false;
         path.throughput /= survival;
     }
     path.direction_pdf = scattered.pdf;
     Ray ray;
     ray.origin = origin;
     ray.direction = direction;
-    ray.seed = path.sequence.bits(dimension + kAlphaNext);
+    ray.seed = path.sequence.bits(vertex_dimension(vertex, kAlphaNext));
     wave.next_rays.set(wave.next_active.size(), ray);
     return true;
 }

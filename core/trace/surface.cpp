@@ -14,6 +14,8 @@ constexpr float kLeastCosine = 1e-4f;
 
 /// `v` with unit length at any scale, or `fallback` where `v` has no direction.
 glm::vec3 normalized_or(const glm::vec3& v, const glm::vec3& fallback) {
+    const float ordinary = glm::dot(v, v);
+    if (ordinary > 1e-20f && ordinary < 1e20f) return v * (1.0f / std::sqrt(ordinary));
     const glm::dvec3 wide(v);
     const double length_squared = glm::dot(wide, wide);
     // Also false for NaN.

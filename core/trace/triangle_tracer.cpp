@@ -19,6 +19,9 @@ namespace {
 /// Triangles that a mesh may have, over all instances together, to be repeated in the flattened level.
 constexpr std::size_t kLargestFlattenedRepeat = 1 << 16;
 
+/// Packets whose directions all lie within this cosine of the first one's are traced as a beam.
+constexpr float kCoherentCosine = 0.97f;
+
 /// What a geometry of the top level stands for.
 struct TopGeometry {
     std::uint32_t instance = kNoIndex;
@@ -94,6 +97,19 @@ bool load_packet(const RayStream& rays, std::size_t first, typename Packet<Width
         any |= valid[lane];
     }
     return any != 0;
+}
+
+/// Whether the rays of a packet look in much the same direction, so that they are worth tracing as one beam.
+template <int Width>
+bool is_coherent(typename Packet<Width>::Ray& packet) {
+    const float x = lane_of(packet.dir_x, 0), y = lane_of(packet.dir_y, 0), z = lane_of(packet.dir_z, 0);
+    int coherent = 1;
+    for (int lane = 1; lane < Width; ++lane) {
+        const float cosine = x * lane_of(packet.dir_x, lane) + y * lane_of(packet.dir_y, lane) +
+                             z * lane_of(packet.dir_z, lane);
+        coherent &= cosine > kCoherentCosine ? 1 : 0;
+    }
+    return coherent != 0;
 }
 
 template <int Width>
@@ -348,6 +364,8 @@ void TriangleTracer::Impl::trace_closest(const RayStream& rays, HitStream& hits)
             lane_of(packet.hit.geomID, lane) = RTC_INVALID_GEOMETRY_ID;
             lane_of(packet.hit.instID[0], lane) = RTC_INVALID_GEOMETRY_ID;
         }
+        static const int mode = getenv("COH") ? atoi(getenv("COH")) : 0;
+        if (mode) context.flags = mode==2 ? (is_coherent<Width>(packet.ray) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT): RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
         if (any) intersect<Width>(valid, root.get(), &context, &packet);
         for (int lane = 0; lane < Width; ++lane) {
             const std::size_t i = first + static_cast<std::size_t>(lane);
@@ -373,6 +391,8 @@ void TriangleTracer::Impl::trace_occluded(const RayStream& rays, std::span<std::
     alignas(64) int valid[Width];
     for (std::size_t first = 0; first < rays.size(); first += Width) {
         const bool any = load_packet<Width>(rays, first, packet, valid);
+        static const int mode = getenv("COH") ? atoi(getenv("COH")) : 0;
+        if (mode) context.flags = mode==2 ? (is_coherent<Width>(packet) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT): RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
         if (any) occlude<Width>(valid, root.get(), &context, &packet);
         const std::size_t count = std::min<std::size_t>(Width, rays.size() - first);
         for (std::size_t lane = 0; lane < count; ++lane) {

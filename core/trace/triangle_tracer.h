@@ -28,7 +28,8 @@ struct TriangleTracerOptions {
 
 /// Two levels: one tree a mesh, one tree over instances.
 ///
-/// A negative t_min counts as 0. A triangle without area (collinear corners) is never hit.
+/// Instances may be scaled by 1e-12 to 1e12; beyond that Embree's float determinants leave their range. A
+/// negative t_min counts as 0. A triangle without area (collinear corners) is never hit.
 class TriangleTracer : public Tracer {
 public:
     /// Builds the trees, in parallel. Keeps a reference: `scene` must outlive the tracer and not change.

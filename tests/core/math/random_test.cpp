@@ -48,6 +48,20 @@ TEST(SampleSequence, HasUncorrelatedDimensions) {
     }
 }
 
+TEST(SampleSequence, HasIndependentPointsThatAreUniform) {
+    // Means and the correlation of 65,536 uniform pairs: 4 standard deviations, sqrt(1/12/n) and 1/sqrt(n).
+    glm::dvec2 sum(0.0);
+    double product = 0.0;
+    for (std::uint32_t i = 0; i < 65536; ++i) {
+        const glm::dvec2 point(core::SampleSequence(i % 256, i / 256).independent_point(5));
+        sum += point;
+        product += (point.x - 0.5) * (point.y - 0.5) * 12.0;
+    }
+    EXPECT_NEAR(sum.x / 65536.0, 0.5, 0.0046);
+    EXPECT_NEAR(sum.y / 65536.0, 0.5, 0.0046);
+    EXPECT_NEAR(product / 65536.0, 0.0, 0.0157);
+}
+
 TEST(UnitFloat, StaysBelowOne) {
     EXPECT_LT(core::unit_float(0xffffffffu), 1.0f);
     EXPECT_EQ(core::unit_float(0), 0.0f);

@@ -157,7 +157,7 @@ TEST(GltfGeometry, NormalisedIntegersSpanZeroToOneOrMinusOneToOne) {
     const int uv = builder.add_accessor(builder.add_view(std::vector<std::uint8_t>{0, 255, 51, 102, 255, 0}),
                                         GltfBuilder::kUnsignedByte, 3, "VEC2", R"("normalized":true)");
     const int normal = builder.add_accessor(
-        builder.add_view(std::vector<std::int8_t>{0, 0, 127, 0, 0, 0, -128, 0, 0, -127, 0, 0}, 4),
+        builder.add_view(std::vector<std::int8_t>{0, 0, 127, 0, -128, 0, 0, 0, 0, -127, 0, 0}, 4),
         GltfBuilder::kByte, 3, "VEC3", R"("normalized":true)");
     const core::Scene scene = load_primitive(
         builder, fmt::format(R"({{"attributes":{{"POSITION":{},"NORMAL":{},"TEXCOORD_0":{}}}}})", position,
