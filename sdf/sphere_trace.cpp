@@ -166,11 +166,12 @@ bool RayMarch::skip_empty(const glm::ivec3& block, double bound_voxels) {
 bool RayMarch::find_in_cell(const Brick& brick, const glm::ivec3& local, Crossing& crossing) {
     const CellCorners corners = CellCorners::load(brick, local);
     const int axis = exit_axis();
-    const bool ends_here = !(next_plane_t_[axis] < t_end_);
-    const double t_exit = std::max(ends_here ? t_end_ : next_plane_t_[axis], t_);
+    // The whole of the cell's segment, even if the ray ends within: its end must not touch the last bits of
+    // a root, or equal surfaces would be found at unequal distances.
+    const double t_exit = std::max(next_plane_t_[axis], t_);
     const glm::dvec3 near =
         point_in_cell(t_, entry_axis_, entry_axis_ >= 0 && step_[entry_axis_] > 0 ? 0.0 : 1.0);
-    const glm::dvec3 far = point_in_cell(t_exit, ends_here ? -1 : axis, step_[axis] > 0 ? 1.0 : 0.0);
+    const glm::dvec3 far = point_in_cell(t_exit, axis, step_[axis] > 0 ? 1.0 : 0.0);
 
     double low = 0.0;
     bool low_is_negative = corners.at(near) < 0.0;
@@ -222,7 +223,8 @@ bool RayMarch::next(Crossing& crossing) {
             }
             if (brick.is_occupied(local.x, local.y, local.z) && find_in_cell(brick, local, crossing)) {
                 crossing.brick = entry;
-                return true;
+                is_done_ = crossing.t > t_end_;
+                return !is_done_;
             }
             resume_from_ = -1.0;
             if (++steps_ >= step_cap_) return false;

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/math/bounds.h"
-#include "core/trace/ray_stream.h"
+#include "core/math/ray.h"
 
 namespace core {
 

@@ -11,12 +11,12 @@
 #include <new>
 #include <vector>
 
+#include "core/math/ray.h"
+
 namespace core {
 
 /// Entries that every column is padded to: the widest vector of 32-bit lanes.
 inline constexpr std::size_t kStreamLanes = 16;
-
-inline constexpr std::uint32_t kNoIndex = std::numeric_limits<std::uint32_t>::max();
 
 /// Hands out 64-byte aligned memory.
 template <typename T>
@@ -40,16 +40,6 @@ using Column = std::vector<T, CacheLineAllocator<T>>;
 constexpr std::size_t padded_stream_size(std::size_t size) {
     return (size + kStreamLanes - 1) / kStreamLanes * kStreamLanes;
 }
-
-/// One ray: points origin + t direction for t in [t_min, t_max]. The direction has unit length, so t is world
-/// distance. `seed` decides the stochastic transparency of BLEND materials and nothing else.
-struct Ray {
-    glm::vec3 origin{0.0f};
-    float t_min = 0.0f;
-    glm::vec3 direction{0.0f, 0.0f, 1.0f};
-    float t_max = std::numeric_limits<float>::infinity();
-    std::uint32_t seed = 0;
-};
 
 /// Many rays, one column a component.
 class RayStream {

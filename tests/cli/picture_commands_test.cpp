@@ -147,6 +147,7 @@ TEST_F(PictureCommands, CompareRefusesWhatCannotBeCompared) {
     EXPECT_EQ(run({"compare", a, path("missing.exr")}).exit_code, 66);
     EXPECT_EQ(run({"compare", a}).exit_code, 64);
     EXPECT_EQ(run({"compare"}).exit_code, 64);
+    EXPECT_EQ(run({"compare", a, a, "-o", "out"}).exit_code, 64);
     EXPECT_EQ(run({"compare", a, a, a}).exit_code, 64);
     EXPECT_EQ(run({"compare", a, path("picture.png")}).exit_code, 64);
     EXPECT_EQ(run({"compare", a, a, "--fail-mse", "-1"}).exit_code, 64);
@@ -157,7 +158,7 @@ TEST_F(PictureCommands, CompareRefusesWhatCannotBeCompared) {
 
 TEST_F(PictureCommands, CompareOfASceneSaysThatItIsNotBuiltYet) {
     for (const char* scene : {"room.gltf", "room.GLB"}) {
-        const Outcome outcome = run({"compare", scene});
+        const Outcome outcome = run({"compare", scene, "-o", "out"});
         EXPECT_EQ(outcome.exit_code, 64);
         EXPECT_NE(outcome.err.find("not built yet"), std::string::npos) << outcome.err;
     }

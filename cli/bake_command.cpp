@@ -1,0 +1,164 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "cli/options.h"
+#include "core/scene/gltf_loader.h"
+#include "core/support/error.h"
+#include "sdf/baker.h"
+
+namespace cli {
+
+namespace {
+
+struct BakeOptions {
+    std::string scene;
+    std::string output;
+    sdf::BakeSettings settings;
+    double voxel = 0.0;
+    CLI::Option* voxel_option = nullptr;
+    std::string surface_class = "auto";
+};
+
+const std::map<std::string, sdf::ClassOverride>& class_names() {
+    static const std::map<std::string, sdf::ClassOverride> names = {{"auto", sdf::ClassOverride::kAuto},
+                                                                    {"solid", sdf::ClassOverride::kSolid},
+                                                                    {"sheet", sdf::ClassOverride::kSheet}};
+    return names;
+}
+
+nlohmann::json as_json(const sdf::MeshBake& bake) {
+    if (!bake.grid) {
+        return {{"name", bake.name},
+                {"triangles", bake.triangle_count},
+                {"seconds", bake.seconds},
+                {"error", bake.error ? bake.error->what() : "not baked"}};
+    }
+    const sdf::FieldInfo& info = bake.info();
+    return {
+        {"name", bake.name},
+        {"triangles", bake.triangle_count},
+        {"class", sdf::class_name(info.mesh_class)},
+        {"voxel", info.voxel_size},
+        {"half_thickness", info.half_thickness},
+        {"file", bake.file.string()},
+        {"bytes", bake.file_bytes},
+        {"memory_bytes", bake.grid->bytes()},
+        {"seconds", bake.seconds},
+        {"reused", bake.reused},
+        {"error_voxels",
+         {{"mean", info.error_voxels.mean}, {"p99", info.error_voxels.p99}, {"max", info.error_voxels.max}}},
+        {"dropped_faces", info.dropped_faces},
+        {"warnings", info.warnings}};
+}
+
+std::string table_of(const sdf::BakeResult& result) {
+    std::string text = fmt::format("{:<32}{:>10}{:>7}{:>12}{:>12}{:>9}  {}\n", "mesh", "triangles", "class",
+                                   "voxel", "bytes", "seconds", "error in voxels: mean, p99, max");
+    for (const sdf::MeshBake& bake : result.meshes) {
+        if (!bake.grid) {
+            text += fmt::format("{:<32}{:>10} failed\n", bake.name, bake.triangle_count);
+            continue;
+        }
+        const sdf::FieldInfo& info = bake.info();
+        text += fmt::format("{:<32}{:>10}{:>7}{:>12.5g}{:>12}{:>9.2f}  {:.3f} {:.3f} {:.3f}{}\n", bake.name,
+                            bake.triangle_count, sdf::class_name(info.mesh_class), info.voxel_size,
+                            bake.file_bytes, bake.seconds, info.error_voxels.mean, info.error_voxels.p99,
+                            info.error_voxels.max, bake.reused ? "  (reused)" : "");
+    }
+    return text;
+}
+
+void report(const Program& program, const sdf::BakeResult& result) {
+    for (const sdf::MeshBake& bake : result.meshes) {
+        if (!bake.grid) continue;
+        for (const std::string& warning : bake.info().warnings) {
+            warn(program, fmt::format("mesh '{}': {}", bake.name, warning));
+        }
+    }
+    if (!program.common.json) {
+        std::fputs(table_of(result).c_str(), stdout);
+        return;
+    }
+    nlohmann::json json = {{"schema", 1}, {"meshes", nlohmann::json::array()}, {"seconds", result.seconds}};
+    for (const sdf::MeshBake& bake : result.meshes) json["meshes"].push_back(as_json(bake));
+    const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    std::printf("%s\n", text.c_str());
+}
+
+/// One error for all meshes that failed, after the others have been baked and reported.
+void throw_failures(const sdf::BakeResult& result) {
+    std::string messages;
+    core::ErrorKind kind = core::ErrorKind::kBadData;
+    for (const sdf::MeshBake& bake : result.meshes) {
+        if (!bake.error) continue;
+        messages += (messages.empty() ? "" : "\n") + std::string(bake.error->what());
+        kind = bake.error->kind();
+    }
+    if (!messages.empty()) throw core::InputError(kind, messages);
+}
+
+void bake(Program& program, const BakeOptions& options) {
+    sdf::BakeSettings settings = options.settings;
+    if (options.voxel_option->count() > 0) settings.voxel_world = options.voxel;
+    settings.surface_class = class_names().at(options.surface_class);
+    core::LoadOptions load;
+    load.allow_external = program.common.allow_external;
+    const core::Scene scene = core::load_gltf(options.scene, load);
+    for (const std::string& warning : scene.warnings) warn(program, warning);
+
+    const core::StopRequested stop = stop_flag();
+    const sdf::BakeResult result =
+        sdf::bake_scene(scene, settings, options.output, make_progress(program), stop);
+    if (stop && stop()) {
+        program.exit_code = stop_exit_code();
+        return;
+    }
+    report(program, result);
+    throw_failures(result);
+}
+
+}  // namespace
+
+void add_bake_command(CLI::App& app, Program& program) {
+    const auto options = std::make_shared<BakeOptions>();
+    sdf::BakeSettings& settings = options->settings;
+    CLI::App& verb = *app.add_subcommand("bake", "Turn the meshes of a scene into signed distance fields");
+    add_common_options(verb, program.common);
+    verb.add_option("SCENE", options->scene, "Scene to read: .gltf or .glb")->required();
+    verb.add_option("-o,--output", options->output, "Folder for the fields, one .vdb a mesh; made if missing")
+        ->required();
+    CLI::Option* resolution =
+        verb.add_option("--resolution", settings.resolution, "Voxels on the longest side of each mesh's box")
+            ->check(CLI::Range(1, sdf::kMostVoxelsAlongSide))
+            ->capture_default_str();
+    options->voxel_option =
+        verb.add_option("--voxel", options->voxel,
+                        "Voxel in world units, by each mesh's largest scale, instead of --resolution")
+            ->check(CLI::PositiveNumber)
+            ->excludes(resolution);
+    verb.add_option("--mesh", settings.only_mesh, "Bake only the mesh of this name");
+    verb.add_option(
+            "--class", options->surface_class,
+            "What surfaces are: auto decides for each connected part; solid encloses a volume; sheet is "
+            "given a thickness of about a voxel")
+        ->check(CLI::IsMember(class_names()))
+        ->capture_default_str();
+    verb.add_option("--max-field-bytes", settings.max_field_bytes,
+                    "Coarsen any field that would take more memory than this; 0: no limit")
+        ->capture_default_str();
+    verb.add_flag("--force", settings.force, "Bake even where the folder holds a bake that fits");
+    verb.footer(
+        "Examples:\n"
+        "  fieldlight bake room.glb -o room.bake\n"
+        "  fieldlight bake room.glb -o room.bake --voxel 0.02 --json\n"
+        "  fieldlight bake room.glb -o room.bake --mesh curtain --class sheet --resolution 256");
+    verb.callback([&program, options] { run_verb(program, [&] { bake(program, *options); }); });
+}
+
+}  // namespace cli
