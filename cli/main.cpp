@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 
 #include "cli/flag_hints.h"
@@ -14,6 +15,7 @@ namespace {
 constexpr int kExitUsage = 64;
 constexpr int kExitInternal = 70;
 constexpr int kExitOutOfMemory = 71;
+constexpr int kExitInputOutput = 74;
 
 int fail(int code, const char* message) {
     std::fprintf(stderr, "fieldlight: %s\n", message);
@@ -40,6 +42,9 @@ int main(int argc, char** argv) {
 
     try {
         app.parse(argc, argv);
+        // Data on stdout that could not be written is a failure like any other.
+        if (std::fflush(stdout) != 0 || !std::cout.flush())
+            return fail(kExitInputOutput, "cannot write to stdout");
         return program.exit_code;
     } catch (const CLI::Success& help) {
         return app.exit(help);

@@ -99,6 +99,8 @@ int stop_exit_code() {
 void install_signal_handlers() {
     std::signal(SIGINT, on_signal);
     std::signal(SIGTERM, on_signal);
+    // A file that grows past a limit is an error of write(), not the end of the program.
+    std::signal(SIGXFSZ, SIG_IGN);
 }
 
 }  // namespace cli

@@ -47,7 +47,8 @@ core::StopRequested stop_flag();
 /// The exit code of a signal that asked for the stop: 130 for SIGINT, 143 for SIGTERM.
 int stop_exit_code();
 
-/// Catches SIGINT and SIGTERM, so that stop_flag() sees them. A second one ends the program at once.
+/// Catches SIGINT and SIGTERM, so that stop_flag() sees them; a second one ends the program at once. Ignores
+/// SIGXFSZ, so that a limit on file sizes is reported like a full disk.
 void install_signal_handlers();
 
 // The verbs. Each declares its flags and help on `app` and runs from CLI11's callback.

@@ -71,7 +71,10 @@ core::ExrAttributes attributes_of(const Program& program, const RenderOptions& o
                                   const core::Frame& frame) {
     const core::CameraRays rays(camera, options.width, options.height);
     core::ExrAttributes attributes;
-    attributes["worldToCamera"] = glm::mat4(rays.camera_from_world());
+    // OpenEXR's camera space is left-handed and looks along +Z; glTF's looks along -Z.
+    const glm::dmat4 flip_z(glm::dvec4(1, 0, 0, 0), glm::dvec4(0, 1, 0, 0), glm::dvec4(0, 0, -1, 0),
+                            glm::dvec4(0, 0, 0, 1));
+    attributes["worldToCamera"] = glm::mat4(flip_z * rays.camera_from_world());
     attributes["worldToNDC"] = glm::mat4(rays.ndc_from_world());
     attributes["samplesPerPixel"] = static_cast<int>(frame.samples_per_pixel);
     attributes["seed"] = std::to_string(program.common.seed);

@@ -124,12 +124,14 @@ void find_signs(const Sources& sources, const FieldLeaf& leaf, const LeafDistanc
         }
         return;
     }
-    constexpr double kSpacing = 1.0 + 1e-6;
+    constexpr double kSpacing = 1.0 + 1e-6, kOnSurface = 1e-7;
     std::array<std::uint8_t, kSampleCount> done{};
     std::array<std::int16_t, kSampleCount> queue;
     for (int start = 0; start < kSampleCount; ++start) {
         if (!leaf.is_active(start) || done[static_cast<std::size_t>(start)]) continue;
-        const std::uint8_t side = ask(start);
+        // On the surface itself there is no side to ask for.
+        const bool is_on_surface = distances.solid[static_cast<std::size_t>(start)] < kOnSurface;
+        const std::uint8_t side = is_on_surface ? std::uint8_t{0} : ask(start);
         std::size_t head = 0, tail = 0;
         queue[tail++] = static_cast<std::int16_t>(start);
         done[static_cast<std::size_t>(start)] = 1;

@@ -20,6 +20,9 @@ constexpr double kSafeThickness = 2.0;
 /// miss it half a voxel away.
 constexpr double kNeededDepth = 0.1;
 
+/// A value of the field, in voxels, that a wall of kSafeThickness has at its middle.
+constexpr double kClearlyInside = 0.9;
+
 struct Piece {
     Triangle triangle;
     double thickness = 0.0;
@@ -76,9 +79,11 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
             cut(triangle, pieces);
             for (Piece& piece : pieces) {
                 const glm::dvec3 center = (piece.triangle.a + piece.triangle.b + piece.triangle.c) / 3.0;
-                piece.thickness = solids.nearest_crossing(center, inward, 1e-9);
-                if (!(piece.thickness < kSafeThickness)) continue;
+                // A voxel below the surface and still a voxel from any: thick, without asking further.
                 double depth = 0.0;
+                if (field.interpolate(center + inward, depth) && depth < -kClearlyInside) continue;
+                piece.thickness = solids.nearest_crossing(center, inward, 1e-9, kSafeThickness);
+                if (!(piece.thickness < kSafeThickness)) continue;
                 if (!field.interpolate(center + 0.5 * piece.thickness * inward, depth)) continue;
                 if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness)) {
                     missing[i].push_back(piece);

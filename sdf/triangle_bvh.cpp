@@ -144,10 +144,12 @@ ClosestTriangle TriangleBvh::closest(const glm::dvec3& point, ClosestTriangle be
     return best;
 }
 
-double TriangleBvh::nearest_crossing(const glm::dvec3& origin, const glm::dvec3& direction,
-                                     double t_min) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    if (nodes_.empty()) return nearest;
+double TriangleBvh::nearest_crossing(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                     double t_max) const {
+    constexpr double kNothing = std::numeric_limits<double>::infinity();
+    if (nodes_.empty()) return kNothing;
+    double nearest = t_max;
+    bool found = false;
     std::uint32_t stack[kMaxDepth];
     int depth = 0;
     stack[depth++] = 0;
@@ -175,10 +177,13 @@ double TriangleBvh::nearest_crossing(const glm::dvec3& origin, const glm::dvec3&
         }
         for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
             const double t = intersect(triangles_[i], origin, direction);
-            if (t > t_min && t < nearest) nearest = t;
+            if (t > t_min && t < nearest) {
+                nearest = t;
+                found = true;
+            }
         }
     }
-    return nearest;
+    return found ? nearest : kNothing;
 }
 
 }  // namespace sdf

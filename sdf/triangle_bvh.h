@@ -49,8 +49,9 @@ public:
     /// The closest triangle, or `seed` where nothing is nearer (at equal distance the lower index wins).
     ClosestTriangle closest(const glm::dvec3& point, ClosestTriangle seed = {}) const;
 
-    /// The nearest t > t_min along the ray at which a triangle is met, or infinity.
-    double nearest_crossing(const glm::dvec3& origin, const glm::dvec3& direction, double t_min) const;
+    /// The nearest t in (t_min, t_max) along the ray at which a triangle is met, or infinity.
+    double nearest_crossing(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                            double t_max) const;
 
     bool empty() const { return nodes_.empty(); }
 

@@ -30,7 +30,7 @@ public:
     explicit WindingNumber(const TriangleBvh& tree);
 
     /// A cluster is expanded where the point is farther from it than `beta` times its radius. With 2 the
-    /// error on closed meshes is about 1e-3; with infinity the sum is exact.
+    /// error on closed meshes is under 1e-2; with infinity the sum is exact.
     double at(const glm::dvec3& point, double beta = 2.0) const;
 
     /// Whether |w| >= 0.5. Points whose fast value is close to the threshold are evaluated again with a much

@@ -34,9 +34,8 @@ public:
     /// Planar distance along the viewing axis of a world point: `Depth.Z`.
     float depth(const glm::vec3& world_position) const;
 
-    /// The row-vector matrices of OpenEXR's `worldToCamera` and `worldToNDC` attributes, in OpenEXR's
-    /// convention (the camera looks along -Z; NDC x, y in [0, 1] over the picture after the divide, y
-    /// downwards).
+    /// For column vectors: into the space of world_from_camera, and to the picture (x, y in [0, 1] after the
+    /// divide, y downwards).
     glm::dmat4 camera_from_world() const;
     glm::dmat4 ndc_from_world() const;
 

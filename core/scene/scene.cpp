@@ -93,24 +93,6 @@ struct LightHash {
     }
 };
 
-/// The sky by what it shows: its mean, which every texel enters, and a grid of directions, which tell turned
-/// and mirrored skies apart.
-void add_sky(Hasher& hasher, const Sky& sky) {
-    hasher.add(sky.black());
-    if (sky.black()) return;
-    hasher.add(sky.mean_luminance());
-    constexpr int kRows = 64;
-    constexpr double kPi = 3.14159265358979323846;
-    for (int row = 0; row < kRows; ++row) {
-        const double polar = (row + 0.5) / kRows * kPi;
-        for (int column = 0; column < 2 * kRows; ++column) {
-            const double azimuth = (column + 0.5) / kRows * kPi;
-            hasher.add(sky.radiance(glm::vec3(std::sin(polar) * std::sin(azimuth), std::cos(polar),
-                                              -std::sin(polar) * std::cos(azimuth))));
-        }
-    }
-}
-
 }  // namespace
 
 Instance make_instance(std::string name, std::uint32_t mesh, std::vector<std::uint32_t> materials,
@@ -195,7 +177,7 @@ std::string scene_hash(const Scene& scene) {
         hasher.add(light.index());
         std::visit(LightHash{hasher}, light);
     }
-    add_sky(hasher, scene.sky);
+    scene.sky.add_to(hasher);
     return hasher.hex();
 }
 

@@ -158,6 +158,17 @@ Sky Sky::read(const std::filesystem::path& path, float rotation) {
                      fmt::format("'{}': a sky is 'none', R,G,B, or a .hdr or .exr file", path.string()));
 }
 
+void Sky::add_to(Hasher& hasher) const {
+    hasher.add(constant_);
+    hasher.add(map_ != nullptr);
+    if (!map_) return;
+    hasher.add(map_->width);
+    hasher.add(map_->height);
+    hasher.add(map_->cos_rotation);
+    hasher.add(map_->sin_rotation);
+    hasher.add_range(std::span<const glm::vec3>(map_->texels));
+}
+
 glm::vec3 Sky::radiance(const glm::vec3& direction) const {
     if (!map_) return constant_;
     return map_->interpolate(map_->point_from_direction(direction));

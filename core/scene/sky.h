@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/image/image.h"
+#include "core/support/hash.h"
 
 namespace core {
 
@@ -42,6 +43,9 @@ public:
     /// A direction with a pdf that follows the luminance; positive wherever radiance() is.
     Sample sample(const glm::vec2& u) const;
     float pdf(const glm::vec3& direction) const;
+
+    /// Adds all that decides the radiance to a content hash.
+    void add_to(Hasher& hasher) const;
 
     /// Mean luminance over the sphere, cd/m^2.
     float mean_luminance() const { return mean_luminance_; }

@@ -19,9 +19,6 @@ namespace {
 /// Triangles that a mesh may have, over all instances together, to be repeated in the flattened level.
 constexpr std::size_t kLargestFlattenedRepeat = 1 << 16;
 
-/// Packets whose directions all lie within this cosine of the first one's are traced as a beam.
-constexpr float kCoherentCosine = 0.97f;
-
 /// What a geometry of the top level stands for.
 struct TopGeometry {
     std::uint32_t instance = kNoIndex;
@@ -77,39 +74,31 @@ T& lane_of(T (&column)[N], int lane) {
 /// Copies rays [first, first + Width) and marks the valid ones with -1. Returns whether any is.
 template <int Width>
 bool load_packet(const RayStream& rays, std::size_t first, typename Packet<Width>::Ray& packet, int* valid) {
+    // One loop a column, so that the compiler copies whole vectors.
+    const auto copy = [first](auto& to, const auto& from) {
+        for (int lane = 0; lane < Width; ++lane) lane_of(to, lane) = from[first + std::size_t(lane)];
+    };
+    copy(packet.org_x, rays.origin_x);
+    copy(packet.org_y, rays.origin_y);
+    copy(packet.org_z, rays.origin_z);
+    copy(packet.dir_x, rays.direction_x);
+    copy(packet.dir_y, rays.direction_y);
+    copy(packet.dir_z, rays.direction_z);
+    copy(packet.tnear, rays.t_min);
+    copy(packet.tfar, rays.t_max);
+    copy(packet.id, rays.seed);
     int any = 0;
     for (int lane = 0; lane < Width; ++lane) {
-        const std::size_t i = first + static_cast<std::size_t>(lane);
-        lane_of(packet.org_x, lane) = rays.origin_x[i];
-        lane_of(packet.org_y, lane) = rays.origin_y[i];
-        lane_of(packet.org_z, lane) = rays.origin_z[i];
-        lane_of(packet.tnear, lane) = std::max(0.0f, rays.t_min[i]);
-        lane_of(packet.dir_x, lane) = rays.direction_x[i];
-        lane_of(packet.dir_y, lane) = rays.direction_y[i];
-        lane_of(packet.dir_z, lane) = rays.direction_z[i];
-        lane_of(packet.time, lane) = 0.0f;
-        lane_of(packet.tfar, lane) = rays.t_max[i];
-        lane_of(packet.mask, lane) = ~0u;
-        lane_of(packet.id, lane) = rays.seed[i];
-        lane_of(packet.flags, lane) = 0;
         // A range that lies before the origin holds nothing that Embree may be asked about.
-        valid[lane] = is_valid_ray(rays.get(i)) && rays.t_max[i] >= 0.0f ? -1 : 0;
+        valid[lane] =
+            is_valid_ray(rays.get(first + std::size_t(lane))) && lane_of(packet.tfar, lane) >= 0.0f ? -1 : 0;
         any |= valid[lane];
+        lane_of(packet.tnear, lane) = std::max(0.0f, lane_of(packet.tnear, lane));
+        lane_of(packet.time, lane) = 0.0f;
+        lane_of(packet.mask, lane) = ~0u;
+        lane_of(packet.flags, lane) = 0;
     }
     return any != 0;
-}
-
-/// Whether the rays of a packet look in much the same direction, so that they are worth tracing as one beam.
-template <int Width>
-bool is_coherent(typename Packet<Width>::Ray& packet) {
-    const float x = lane_of(packet.dir_x, 0), y = lane_of(packet.dir_y, 0), z = lane_of(packet.dir_z, 0);
-    int coherent = 1;
-    for (int lane = 1; lane < Width; ++lane) {
-        const float cosine = x * lane_of(packet.dir_x, lane) + y * lane_of(packet.dir_y, lane) +
-                             z * lane_of(packet.dir_z, lane);
-        coherent &= cosine > kCoherentCosine ? 1 : 0;
-    }
-    return coherent != 0;
 }
 
 template <int Width>
@@ -355,6 +344,7 @@ void TriangleTracer::Impl::set_hit(const RayStream& rays, std::size_t i, std::ui
 template <int Width>
 void TriangleTracer::Impl::trace_closest(const RayStream& rays, HitStream& hits) const {
     RTCIntersectContext context;
+    // INCOHERENT is the default and stays: with COHERENT, Embree 3.13.5 does not return from some packets.
     rtcInitIntersectContext(&context);
     typename Packet<Width>::RayHit packet;
     alignas(64) int valid[Width];
@@ -364,8 +354,6 @@ void TriangleTracer::Impl::trace_closest(const RayStream& rays, HitStream& hits)
             lane_of(packet.hit.geomID, lane) = RTC_INVALID_GEOMETRY_ID;
             lane_of(packet.hit.instID[0], lane) = RTC_INVALID_GEOMETRY_ID;
         }
-        static const int mode = getenv("COH") ? atoi(getenv("COH")) : 0;
-        if (mode) context.flags = mode==2 ? (is_coherent<Width>(packet.ray) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT): RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
         if (any) intersect<Width>(valid, root.get(), &context, &packet);
         for (int lane = 0; lane < Width; ++lane) {
             const std::size_t i = first + static_cast<std::size_t>(lane);
@@ -391,8 +379,6 @@ void TriangleTracer::Impl::trace_occluded(const RayStream& rays, std::span<std::
     alignas(64) int valid[Width];
     for (std::size_t first = 0; first < rays.size(); first += Width) {
         const bool any = load_packet<Width>(rays, first, packet, valid);
-        static const int mode = getenv("COH") ? atoi(getenv("COH")) : 0;
-        if (mode) context.flags = mode==2 ? (is_coherent<Width>(packet) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT): RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
         if (any) occlude<Width>(valid, root.get(), &context, &packet);
         const std::size_t count = std::min<std::size_t>(Width, rays.size() - first);
         for (std::size_t lane = 0; lane < count; ++lane) {

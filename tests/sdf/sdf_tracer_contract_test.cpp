@@ -7,7 +7,7 @@
 namespace tests {
 namespace {
 
-constexpr int kResolution = 128;
+constexpr int kResolution = 96;
 
 TracerFactory distance_fields() {
     TracerFactory factory;
@@ -18,8 +18,9 @@ TracerFactory distance_fields() {
         return std::make_unique<sdf::SdfTracer>(
             scene, sdf::grids_by_mesh(scene, sdf::bake_scene(scene, settings, {})));
     };
-    // A trilinear cell lies off a surface of radius r voxels by up to 1 / 8r voxels along each of two axes; the
-    // most curved surface of the suite has a radius of 10 voxels, and its facets' creases add as much again.
+    // A trilinear cell lies off a surface of radius r voxels by up to 1 / 8r voxels along each of two axes;
+    // the most curved surface of the suite has a radius of 10 voxels, and its facets' creases add as much
+    // again.
     factory.position_tolerance = 0.05 / kResolution;
     // Central differences turn the normal of a facet's crease into an arc two voxels wide.
     factory.normal_tolerance_degrees = 2.0;

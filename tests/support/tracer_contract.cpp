@@ -194,7 +194,7 @@ TEST_P(TracerContract, HitsASphereAtTheAnalyticDistanceFromOutsideAndInside) {
     }
 }
 
-TEST_P(TracerContract, HitsABoxAtTheAnalyticDistanceAndItsUvAndNormalFollow) {
+TEST_P(TracerContract, HitsABoxAtTheAnalyticDistanceWithTheFaceNormal) {
     const glm::dvec3 half(0.5, 0.4, 0.3);
     const double margin = factory().edge_margin * 1.0 + 1e-3;
     for (const glm::dmat4& matrix :

@@ -127,6 +127,22 @@ TEST_P(TracerContract, OneInstanceMayHideWhileAnotherOfTheSameMeshShows) {
     EXPECT_NEAR(hits.t[0], 4.5, allowed(scene.meshes[0], 6.0));
 }
 
+TEST_P(TracerContract, EachPartOfAMeshHasItsOwnAlphaAndItsOwnTriangles) {
+    // Two boxes one behind the other in one mesh; either part may be the one that is cut away.
+    for (const std::uint32_t hidden_part : {0u, 1u}) {
+        core::Scene scene = scene_of(merged(box(), moved(box(), translation({0, 0, -2}))));
+        core::Material hidden = lambert(glm::vec3(0.5f));
+        hidden.alpha_mode = core::AlphaMode::kMask;
+        hidden.base_color.a = 0.0f;
+        scene.instances[0].materials[hidden_part] = add_material(scene, hidden);
+        const auto tracer = make(scene);
+        const core::HitStream hits = trace(*tracer, stream_of({ray_down(0.1, 0.2, 1)}));
+        ASSERT_TRUE(hits.get(0).hit());
+        EXPECT_NEAR(hits.t[0], hidden_part == 0 ? 4.5 : 2.5, allowed(scene.meshes[0], 6.0));
+        EXPECT_EQ(scene.meshes[0].part_of_triangle[hits.triangle[0]], 1 - hidden_part);
+    }
+}
+
 TEST_P(TracerContract, RaysThatLeaveAHitDoNotMeetItsSurfaceAgain) {
     // Convex shapes: nothing but the surface itself is there to be hit.
     for (const core::Mesh& mesh : {icosphere(4), box({0.5f, 0.4f, 0.3f})}) {

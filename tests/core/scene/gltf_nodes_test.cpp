@@ -203,13 +203,14 @@ TEST(GltfNodes, LightsShineAlongTheNodesMinusZ) {
     builder.set("extensions",
                 R"({"KHR_lights_punctual":{"lights":[{"type":"directional","color":[1,0.5,0],"intensity":4},)"
                 R"({"type":"point","intensity":7},{"type":"spot"}]}})");
-    const std::string light = R"("extensions":{{"KHR_lights_punctual":{{"light":{}}}}})";
     const double half = std::sqrt(0.5);
     // -90 degrees about x turns -Z into -Y.
-    builder.add("nodes", fmt::format(R"({{"rotation":[{},0,0,{}],"scale":[2,2,2],)", -half, half) +
-                             fmt::format(fmt::runtime(light), 0) + "}");
-    builder.add("nodes", R"({"translation":[1,2,3],)" + fmt::format(fmt::runtime(light), 1) + "}");
-    builder.add("nodes", "{" + fmt::format(fmt::runtime(light), 2) + "}");
+    const std::string members[] = {fmt::format(R"("rotation":[{},0,0,{}],"scale":[2,2,2])", -half, half),
+                                   R"("translation":[1,2,3])", R"("name":"torch")"};
+    for (int i = 0; i < 3; ++i) {
+        builder.add("nodes", fmt::format(R"({{{},"extensions":{{"KHR_lights_punctual":{{"light":{}}}}}}})",
+                                         members[i], i));
+    }
     const core::Scene scene = builder.load();
     ASSERT_EQ(scene.lights.size(), 3u);
     const auto& sun = std::get<core::DirectionalLight>(scene.lights[0]);
@@ -219,6 +220,7 @@ TEST(GltfNodes, LightsShineAlongTheNodesMinusZ) {
     EXPECT_EQ(point.position, glm::vec3(1, 2, 3));
     EXPECT_EQ(point.intensity, glm::vec3(7));
     const auto& spot = std::get<core::SpotLight>(scene.lights[2]);
+    EXPECT_EQ(spot.name, "torch");
     EXPECT_EQ(spot.intensity, glm::vec3(1)) << "defaults: white, 1 cd, cones of 0 and pi / 4";
     EXPECT_FLOAT_EQ(spot.cos_inner, 1.0f);
     EXPECT_FLOAT_EQ(spot.cos_outer, static_cast<float>(std::cos(std::numbers::pi / 4)));

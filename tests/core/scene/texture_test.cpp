@@ -18,10 +18,7 @@ core::TextureImage ramp() {
     core::TextureImage image;
     image.width = 4;
     image.height = 1;
-    for (int x = 0; x < 4; ++x) {
-        const auto grey = static_cast<std::uint8_t>(85 * x);
-        image.rgba.insert(image.rgba.end(), {grey, grey, grey, static_cast<std::uint8_t>(255 - grey)});
-    }
+    image.rgba = {0, 0, 0, 255, 85, 85, 85, 170, 170, 170, 170, 85, 255, 255, 255, 0};
     return image;
 }
 

@@ -1,0 +1,349 @@
+#include "sdf/vdb_file.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Diagnostics.h>
+#include <openvdb/tools/LevelSetUtil.h>
+
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <limits>
+
+#include "core/support/error.h"
+#include "sdf/baker.h"
+#include "tests/sdf/baked_shapes.h"
+#include "tests/support/shared_data.h"
+
+namespace tests {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string bytes_of(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+openvdb::GridPtrVec grids_in(const fs::path& path) {
+    openvdb::io::File file(path.string());
+    file.open(false);
+    return *file.getGrids();
+}
+
+void expect_refused(const fs::path& path, core::ErrorKind kind, const std::string& word) {
+    try {
+        static_cast<void>(sdf::read_field(path));
+        ADD_FAILURE() << "was read; '" << word << "' should have been complained of";
+    } catch (const core::InputError& error) {
+        EXPECT_EQ(error.kind(), kind);
+        EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+        EXPECT_NE(std::string(error.what()).find(path.filename().string()), std::string::npos)
+            << error.what();
+    }
+}
+
+/// A good file after `spoil` has had its way with the grids.
+class SpoiledFile {
+public:
+    explicit SpoiledFile(const std::function<void(openvdb::FloatGrid&, openvdb::Int32Grid&)>& spoil) {
+        sdf::write_field(path(), bake(icosphere(2), 16), "ball");
+        const openvdb::GridPtrVec grids = grids_in(path());
+        const auto distance = openvdb::gridPtrCast<openvdb::FloatGrid>(grids[0]);
+        const auto triangle = openvdb::gridPtrCast<openvdb::Int32Grid>(grids[1]);
+        spoil(*distance, *triangle);
+        openvdb::io::File(path().string()).write({distance, triangle});
+    }
+    fs::path path() const { return folder_.path() / "spoiled.vdb"; }
+
+private:
+    TemporaryFolder folder_;
+};
+
+TEST(VdbFile, ComesBackAsItWasWritten) {
+    const TemporaryFolder folder;
+    const core::Mesh mesh = merged(icosphere(2), moved(quad(), translation({0, 0, 2})));
+    sdf::SampledField field = bake(mesh, 24);
+    field.info.source_hash = "source";
+    field.info.settings_hash = "settings";
+    field.info.warnings = {"first", "second"};
+    const fs::path path = folder.path() / "field.vdb";
+    sdf::write_field(path, field, "both");
+    const sdf::SampledField back = sdf::read_field(path);
+    EXPECT_EQ(back.info.mesh_class, field.info.mesh_class);
+    EXPECT_EQ(back.info.voxel_size, field.info.voxel_size);
+    EXPECT_EQ(back.info.origin, field.info.origin);
+    EXPECT_EQ(back.info.half_thickness, field.info.half_thickness);
+    EXPECT_EQ(back.info.clean_level_set, field.info.clean_level_set);
+    EXPECT_EQ(back.info.triangle_count, field.info.triangle_count);
+    EXPECT_EQ(back.info.error_voxels.p99, field.info.error_voxels.p99);
+    EXPECT_EQ(back.info.source_hash, "source");
+    EXPECT_EQ(back.info.settings_hash, "settings");
+    EXPECT_EQ(back.info.warnings, field.info.warnings);
+    EXPECT_EQ(back.inflated, field.inflated);
+    ASSERT_EQ(back.leaves.size(), field.leaves.size());
+    for (std::size_t i = 0; i < field.leaves.size(); ++i) {
+        ASSERT_EQ(back.leaves[i].origin, field.leaves[i].origin);
+        ASSERT_EQ(back.leaves[i].active, field.leaves[i].active);
+        for (int k = 0; k < sdf::kLeafSize; ++k) {
+            if (!field.leaves[i].is_active(k)) continue;
+            const auto slot = static_cast<std::size_t>(k);
+            ASSERT_EQ(back.leaves[i].distance[slot], field.leaves[i].distance[slot]);
+            ASSERT_EQ(back.leaves[i].triangle[slot], field.leaves[i].triangle[slot]);
+        }
+    }
+}
+
+TEST(VdbFile, TheSameFieldGivesTheSameBytes) {
+    const TemporaryFolder folder;
+    sdf::write_field(folder.path() / "a.vdb", bake(icosphere(2), 24), "ball");
+    sdf::write_field(folder.path() / "b.vdb", bake(icosphere(2), 24), "ball");
+    const std::string a = bytes_of(folder.path() / "a.vdb");
+    EXPECT_GT(a.size(), 1000u);
+    EXPECT_TRUE(a == bytes_of(folder.path() / "b.vdb"));
+}
+
+TEST(VdbFile, ClosedMeshesAreLevelSetsByOpenVdbsOwnCheck) {
+    openvdb::initialize();
+    for (const core::Mesh& mesh : {icosphere(3), torus(1.0f, 0.4f, 48, 24)}) {
+        const TemporaryFolder folder;
+        const fs::path path = folder.path() / "level_set.vdb";
+        sdf::write_field(path, bake(mesh, 32), "shape");
+        const openvdb::GridPtrVec grids = grids_in(path);
+        ASSERT_EQ(grids.size(), 2u);
+        const auto distance = openvdb::gridPtrCast<openvdb::FloatGrid>(grids[0]);
+        ASSERT_TRUE(distance);
+        EXPECT_EQ(distance->getName(), "distance");
+        EXPECT_EQ(distance->getGridClass(), openvdb::GRID_LEVEL_SET);
+        EXPECT_EQ(openvdb::tools::checkLevelSet(*distance, 9), "");
+        // Space deep inside is negative too.
+        const openvdb::Coord deep = mesh.positions.size() > 1000
+                                        ? openvdb::Coord::round(distance->worldToIndex({1.0, 0.0, 0.0}))
+                                        : openvdb::Coord(0, 0, 0);
+        EXPECT_LT(distance->tree().getValue(deep), 0.0f);
+    }
+}
+
+TEST(VdbFile, SheetsDoNotClaimToBeLevelSets) {
+    const TemporaryFolder folder;
+    sdf::write_field(folder.path() / "sheet.vdb", bake(quad(), 16), "sheet");
+    const std::vector<sdf::VdbGridSummary> grids = sdf::summarise_vdb(folder.path() / "sheet.vdb");
+    ASSERT_EQ(grids.size(), 2u);
+    EXPECT_EQ(grids[0].name, "distance");
+    EXPECT_EQ(grids[0].grid_class, "unknown");
+    EXPECT_EQ(grids[0].metadata.at("fieldlight_class"), "sheet");
+    EXPECT_EQ(grids[0].metadata.at("fieldlight_inflated_triangles"), "0-1");
+}
+
+TEST(VdbFile, SummaryTellsWhatIsThere) {
+    const TemporaryFolder folder;
+    const sdf::SampledField field = bake(icosphere(2), 16);
+    sdf::write_field(folder.path() / "ball.vdb", field, "ball");
+    const sdf::VdbGridSummary distance = sdf::summarise_vdb(folder.path() / "ball.vdb")[0];
+    std::size_t active = 0;
+    for_each_sample(field, [&](const glm::dvec3&, float, std::int32_t) { ++active; });
+    EXPECT_EQ(distance.active_voxels, active);
+    EXPECT_EQ(distance.type, "float");
+    EXPECT_EQ(distance.grid_class, "level set");
+    EXPECT_EQ(distance.nan_samples, 0u);
+    EXPECT_NEAR(distance.voxel_size.x, field.info.voxel_size, 1e-15);
+    // The band reaches four voxels beyond the unit ball, sampled at whole voxels.
+    EXPECT_NEAR(distance.maximum.x, 1.0 + 4.0 * field.info.voxel_size, 2.0 * field.info.voxel_size);
+
+    const SpoiledFile spoiled([](openvdb::FloatGrid& grid, openvdb::Int32Grid&) {
+        grid.tree().beginLeaf()->beginValueOn().setValue(std::nanf(""));
+    });
+    EXPECT_EQ(sdf::summarise_vdb(spoiled.path())[0].nan_samples, 1u);
+}
+
+TEST(VdbFile, SpoiledFilesAreRefusedByName) {
+    using Distance = openvdb::FloatGrid;
+    using Index = openvdb::Int32Grid;
+    const auto refused = [](const std::string& word, const std::function<void(Distance&, Index&)>& spoil) {
+        const SpoiledFile file(spoil);
+        expect_refused(file.path(), core::ErrorKind::kBadData, word);
+    };
+    refused("sample is nan",
+            [](Distance& grid, Index&) { grid.tree().beginLeaf()->beginValueOn().setValue(std::nanf("")); });
+    refused("sample is inf", [](Distance& grid, Index&) {
+        grid.tree().beginLeaf()->beginValueOn().setValue(std::numeric_limits<float>::infinity());
+    });
+    refused("background", [](Distance& grid, Index&) { grid.tree().root().setBackground(0.0f, false); });
+    refused("names triangle", [](Distance&, Index& index) {
+        for (auto leaf = index.tree().beginLeaf(); leaf; ++leaf) leaf->fill(1'000'000);
+    });
+    refused("transform", [](Distance& grid, Index&) {
+        grid.setTransform(openvdb::math::Transform::createLinearTransform(0.123));
+    });
+    refused("lattice coordinate",
+            [](Distance& grid, Index&) { grid.tree().setValue(openvdb::Coord(1 << 28, 0, 0), 0.01f); });
+    refused("no grid 'distance'", [](Distance& grid, Index&) { grid.setName("density"); });
+    refused("no grid 'triangle'", [](Distance&, Index& index) { index.setName("density"); });
+    refused("fieldlight_class", [](Distance& grid, Index&) { grid.removeMeta("fieldlight_class"); });
+    refused("class 'gas'", [](Distance& grid, Index&) {
+        grid.insertMeta("fieldlight_class", openvdb::StringMetadata("gas"));
+    });
+    refused("baked by", [](Distance& grid, Index&) {
+        grid.insertMeta("fieldlight_writer", openvdb::StringMetadata("someone else"));
+    });
+    refused("fieldlight_voxel", [](Distance& grid, Index&) {
+        grid.insertMeta("fieldlight_voxel", openvdb::DoubleMetadata(std::nan("")));
+    });
+    refused("ranges of triangles", [](Distance& grid, Index&) {
+        grid.insertMeta("fieldlight_inflated_triangles", openvdb::StringMetadata("5-99999999999"));
+    });
+}
+
+TEST(VdbFile, TruncatedAndForeignFilesAreRefusedByName) {
+    const TemporaryFolder folder;
+    const fs::path whole = folder.path() / "whole.vdb", part = folder.path() / "part.vdb";
+    sdf::write_field(whole, bake(icosphere(2), 16), "ball");
+    const std::string bytes = bytes_of(whole);
+    for (const double fraction : {0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 0.999}) {
+        std::ofstream(part, std::ios::binary)
+            .write(bytes.data(), static_cast<std::streamsize>(fraction * double(bytes.size())));
+        expect_refused(part, core::ErrorKind::kBadData, "not a whole .vdb");
+    }
+    std::ofstream(part) << "this is no grid";
+    expect_refused(part, core::ErrorKind::kBadData, "not a whole .vdb");
+    expect_refused(folder.path() / "missing.vdb", core::ErrorKind::kNoInput, "no such file");
+}
+
+core::Scene two_meshes() {
+    core::Scene scene = scene_of(icosphere(2));
+    scene.name = "two.glb";
+    scene.meshes[0].name = "ball";
+    add_instance(scene, add_mesh(scene, box()), translation({3, 0, 0}));
+    scene.meshes[1].name = "odd/name: %";
+    return scene;
+}
+
+TEST(Baker, ReusesWhatFitsAndOnlyThat) {
+    const TemporaryFolder folder;
+    core::Scene scene = two_meshes();
+    sdf::BakeSettings settings;
+    settings.resolution = 16;
+    const auto reused = [&] {
+        const sdf::BakeResult result = sdf::bake_scene(scene, settings, folder.path());
+        EXPECT_EQ(result.meshes.size(), 2u);
+        std::string pattern;
+        for (const sdf::MeshBake& mesh : result.meshes) {
+            EXPECT_TRUE(mesh.grid);
+            EXPECT_TRUE(fs::exists(mesh.file)) << mesh.file;
+            EXPECT_EQ(mesh.file.parent_path(), folder.path());
+            EXPECT_EQ(mesh.file_bytes, fs::file_size(mesh.file));
+            pattern += mesh.reused ? 'r' : 'b';
+        }
+        return pattern;
+    };
+    EXPECT_EQ(reused(), "bb");
+    EXPECT_EQ(reused(), "rr");
+    scene.meshes[0].positions[0].x += 1e-4f;
+    EXPECT_EQ(reused(), "br");
+    settings.resolution = 17;
+    EXPECT_EQ(reused(), "bb");
+    settings.surface_class = sdf::ClassOverride::kSheet;
+    EXPECT_EQ(reused(), "bb");
+    settings.force = true;
+    EXPECT_EQ(reused(), "bb");
+}
+
+TEST(Baker, AReusedGridTracesLikeAFreshOne) {
+    const TemporaryFolder folder;
+    const core::Scene scene = two_meshes();
+    sdf::BakeSettings settings;
+    settings.resolution = 24;
+    const sdf::BakeResult fresh = sdf::bake_scene(scene, settings, folder.path());
+    const sdf::BakeResult again = sdf::bake_scene(scene, settings, folder.path());
+    ASSERT_TRUE(again.meshes[0].reused);
+    const sdf::BrickGrid &a = *fresh.meshes[0].grid, &b = *again.meshes[0].grid;
+    ASSERT_EQ(a.block_count(), b.block_count());
+    ASSERT_EQ(a.brick_count(), b.brick_count());
+    EXPECT_EQ(a.origin(), b.origin());
+    for (std::size_t i = 0; i < a.brick_count(); ++i) {
+        const sdf::Brick &x = a.brick_at(std::int32_t(i)), &y = b.brick_at(std::int32_t(i));
+        ASSERT_EQ(std::memcmp(&x, &y, sizeof(sdf::Brick)), 0);
+    }
+}
+
+TEST(Baker, ADamagedBakeIsReplacedAndSaid) {
+    const TemporaryFolder folder;
+    const core::Scene scene = two_meshes();
+    sdf::BakeSettings settings;
+    settings.resolution = 16;
+    const fs::path file = sdf::bake_scene(scene, settings, folder.path()).meshes[0].file;
+    const std::string bytes = bytes_of(file);
+    std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size() / 2));
+    const sdf::MeshBake mended = sdf::bake_scene(scene, settings, folder.path()).meshes[0];
+    EXPECT_FALSE(mended.reused);
+    ASSERT_EQ(mended.info().warnings.size(), 1u);
+    EXPECT_NE(mended.info().warnings[0].find("of no use"), std::string::npos);
+    EXPECT_TRUE(bytes == bytes_of(file));
+}
+
+TEST(Baker, AMeshThatCannotBeBakedFailsAloneAndByName) {
+    core::Scene scene = two_meshes();
+    for (glm::vec3& p : scene.meshes[0].positions) p.y = p.z = 0.0f;
+    const TemporaryFolder folder;
+    const sdf::BakeResult result = sdf::bake_scene(scene, {}, folder.path());
+    ASSERT_TRUE(result.meshes[0].error);
+    EXPECT_FALSE(result.meshes[0].grid);
+    EXPECT_NE(std::string(result.meshes[0].error->what()).find("'two.glb': mesh 'ball'"), std::string::npos)
+        << result.meshes[0].error->what();
+    EXPECT_TRUE(result.meshes[1].grid);
+    const auto grids = sdf::grids_by_mesh(scene, result);
+    EXPECT_FALSE(grids[0]);
+    EXPECT_TRUE(grids[1]);
+}
+
+TEST(Baker, VoxelsInWorldUnitsFollowTheLargestScale) {
+    core::Scene scene = scene_of(box());
+    add_instance(scene, 0, rotation(0.3, {1, 1, 0}) * scaling({1.0, -4.0, 2.0}));
+    sdf::BakeSettings settings;
+    settings.voxel_world = 0.2;
+    // The rotation leaves the largest singular value at 4, but for rounding.
+    EXPECT_NEAR(sdf::bake_scene(scene, settings, {}).meshes[0].info().voxel_size, 0.05, 1e-12);
+}
+
+TEST(Baker, LimitsMakeFieldsCoarserAndSaySo) {
+    const core::Scene scene = scene_of(icosphere(3));
+    sdf::BakeSettings settings;
+    settings.voxel_world = 1e-3;
+    settings.max_dimension = 40;
+    const sdf::MeshBake clamped = sdf::bake_scene(scene, settings, {}).meshes[0];
+    EXPECT_NEAR(clamped.info().voxel_size, 2.0 / 40, 1e-6);
+    EXPECT_EQ(clamped.info().warnings.size(), 1u);
+
+    settings = {};
+    settings.resolution = 64;
+    const std::size_t unlimited = sdf::bake_scene(scene, settings, {}).meshes[0].grid->bytes();
+    settings.max_field_bytes = unlimited / 3;
+    const sdf::MeshBake small = sdf::bake_scene(scene, settings, {}).meshes[0];
+    EXPECT_LE(small.grid->bytes(), settings.max_field_bytes);
+    EXPECT_GT(small.grid->bytes(), settings.max_field_bytes / 4);
+    EXPECT_FALSE(small.info().warnings.empty());
+}
+
+TEST(Baker, WrongSettingsAreUsageErrors) {
+    const core::Scene scene = scene_of(box());
+    const auto refused = [&](const sdf::BakeSettings& settings) {
+        try {
+            static_cast<void>(sdf::bake_scene(scene, settings, {}));
+            ADD_FAILURE() << "was accepted";
+        } catch (const core::InputError& error) {
+            EXPECT_EQ(error.kind(), core::ErrorKind::kUsage);
+        }
+    };
+    sdf::BakeSettings settings;
+    settings.resolution = 0;
+    refused(settings);
+    settings = {};
+    settings.voxel_world = -1.0;
+    refused(settings);
+    settings = {};
+    settings.only_mesh = "no such mesh";
+    refused(settings);
+}
+
+}  // namespace
+}  // namespace tests
