@@ -54,7 +54,7 @@ nlohmann::json as_json(const sdf::MeshBake& bake) {
         {"error_voxels",
          {{"mean", info.error_voxels.mean}, {"p99", info.error_voxels.p99}, {"max", info.error_voxels.max}}},
         {"dropped_faces", info.dropped_faces},
-        {"warnings", info.warnings}};
+        {"warnings", bake.warnings}};
 }
 
 std::string table_of(const sdf::BakeResult& result) {
@@ -76,8 +76,7 @@ std::string table_of(const sdf::BakeResult& result) {
 
 void report(const Program& program, const sdf::BakeResult& result) {
     for (const sdf::MeshBake& bake : result.meshes) {
-        if (!bake.grid) continue;
-        for (const std::string& warning : bake.info().warnings) {
+        for (const std::string& warning : bake.warnings) {
             warn(program, fmt::format("mesh '{}': {}", bake.name, warning));
         }
     }

@@ -5,55 +5,52 @@
 #include <numeric>
 
 #include "core/support/parallel.h"
+#include "sdf/surface_samples.h"
 
 namespace sdf {
 
 namespace {
 
-constexpr std::size_t kSampleCount = 100'000;
+constexpr std::size_t kMostSamples = 100'000, kFewestSamples = 2'000;
+
+/// As many points as a small surface needs: this many a square voxel.
+constexpr double kSamplesPerArea = 2.0;
 
 /// An error so large that the point may be buried in another solid.
 constexpr double kSuspectVoxels = 0.5;
 
-double error_at(const glm::dvec3& point, const Triangle& triangle, bool inflated,
-                const WindingNumber& winding, const LeafMap& field) {
+double error_at(const SurfaceSample& sample, bool inflated, const WindingNumber& winding,
+                const LeafMap& field) {
     double value = 0.0;
-    if (!field.interpolate(point, value)) return kBandVoxels;
+    if (!field.interpolate(sample.position, value)) return kBandVoxels;
     double error = std::abs(value);
     if (inflated) error = std::min(error, std::abs(error - kHalfThicknessVoxels));
     if (error > kSuspectVoxels) {
-        const glm::dvec3 step = 0.25 * glm::normalize(triangle.scaled_normal());
-        if (winding.is_inside(point + step) && winding.is_inside(point - step)) return -1.0;
+        const glm::dvec3 step = 0.25 * sample.normal;
+        if (winding.is_inside(sample.position + step) && winding.is_inside(sample.position - step)) {
+            return -1.0;
+        }
     }
     return error;
+}
+
+std::size_t sample_count(const std::vector<Triangle>& corners) {
+    double area = 0.0;
+    for (const Triangle& triangle : corners) area += 0.5 * glm::length(triangle.scaled_normal());
+    return static_cast<std::size_t>(std::clamp(kSamplesPerArea * area, static_cast<double>(kFewestSamples),
+                                               static_cast<double>(kMostSamples)));
 }
 
 }  // namespace
 
 ErrorFigures measure_error(const std::vector<Triangle>& corners, const std::vector<std::uint8_t>& inflated,
                            const WindingNumber& winding, const LeafMap& field) {
-    std::vector<double> cumulative(corners.size());
-    double total = 0.0;
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-        total += glm::length(corners[i].scaled_normal());
-        cumulative[i] = total;
-    }
-    std::vector<double> errors(kSampleCount);
-    core::parallel_for(kSampleCount, 512, [&](std::size_t begin, std::size_t end) {
+    const SurfaceSamples samples(corners, sample_count(corners));
+    std::vector<double> errors(sample_count(corners));
+    core::parallel_for(errors.size(), 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const double target = (static_cast<double>(i) + 0.5) / kSampleCount * total;
-            const auto found = std::upper_bound(cumulative.begin(), cumulative.end() - 1, target);
-            const auto number = static_cast<std::size_t>(found - cumulative.begin());
-            const Triangle& triangle = corners[number];
-            // The additive recurrence of the plastic number, folded into the triangle.
-            double u = std::fmod(0.5 + static_cast<double>(i) * 0.7548776662466927, 1.0);
-            double v = std::fmod(0.5 + static_cast<double>(i) * 0.5698402909980532, 1.0);
-            if (u + v > 1.0) {
-                u = 1.0 - u;
-                v = 1.0 - v;
-            }
-            errors[i] = error_at(triangle.a + u * (triangle.b - triangle.a) + v * (triangle.c - triangle.a),
-                                 triangle, inflated[number] != 0, winding, field);
+            const SurfaceSample sample = samples.at(i);
+            errors[i] = error_at(sample, inflated[sample.triangle] != 0, winding, field);
         }
     });
     std::erase_if(errors, [](double error) { return error < 0.0; });

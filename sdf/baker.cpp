@@ -82,8 +82,8 @@ struct BakedGrid {
 
 /// Bakes and lays out, coarser where limits ask for it.
 BakedGrid bake_within_limits(const core::Mesh& mesh, double voxel, double longest_side,
-                             const BakeSettings& settings, const BakeKey& key,
-                             std::vector<std::string> warnings) {
+                             const BakeSettings& settings, const BakeKey& key) {
+    std::vector<std::string> warnings;
     const double finest = longest_side / settings.max_dimension;
     if (voxel < finest) {
         warnings.push_back(fmt::format("a voxel of {:g} would give {:.0f} voxels along a side; {:g} is used",
@@ -140,17 +140,18 @@ void bake_one(const core::Scene& scene, const BakeSettings& settings, const fs::
     }
     const double voxel = wanted_voxel(scene, bake.mesh, longest, settings);
     const BakeKey key{source_hash(mesh), settings_hash(voxel, settings)};
-    std::vector<std::string> warnings;
     if (!folder.empty()) {
         bake.file = folder / file_name(mesh, bake.mesh);
-        if (!settings.force) bake.grid = reuse(bake.file, key, warnings);
+        if (!settings.force) bake.grid = reuse(bake.file, key, bake.warnings);
         bake.reused = bake.grid != nullptr;
     }
     if (!bake.reused) {
-        const BakedGrid baked = bake_within_limits(mesh, voxel, longest, settings, key, std::move(warnings));
+        const BakedGrid baked = bake_within_limits(mesh, voxel, longest, settings, key);
         if (!folder.empty()) write_field(bake.file, baked.field, mesh.name);
         bake.grid = baked.grid;
     }
+    const std::vector<std::string>& lasting = bake.info().warnings;
+    bake.warnings.insert(bake.warnings.end(), lasting.begin(), lasting.end());
     if (!bake.file.empty()) bake.file_bytes = fs::file_size(bake.file);
 }
 
@@ -211,6 +212,7 @@ BakeResult bake_scene(const core::Scene& scene, const BakeSettings& settings, co
     for (std::uint32_t i = 0; i < scene.meshes.size(); ++i) {
         const core::Mesh& mesh = scene.meshes[i];
         if (!settings.only_mesh.empty() && mesh.name != settings.only_mesh) continue;
+        if (mesh.triangles.empty()) continue;
         MeshBake bake;
         bake.mesh = i;
         bake.name = mesh.name;

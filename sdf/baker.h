@@ -44,16 +44,19 @@ struct MeshBake {
     std::uint64_t file_bytes = 0;
     double seconds = 0.0;
     bool reused = false;  ///< Read from the folder instead of baked.
+    /// Of the field (FieldInfo::warnings), and of this run: an earlier bake that was of no use.
+    std::vector<std::string> warnings;
     /// Why there is no grid; names the mesh.
     std::optional<core::InputError> error;
 
-    /// Class, voxel, error figures, warnings. @pre grid
+    /// Class, voxel, error figures. @pre grid
     const FieldInfo& info() const { return grid->info(); }
 };
 
 struct BakeResult {
-    std::vector<MeshBake> meshes;  ///< One a mesh of the scene that was asked for, in order.
-    double seconds = 0.0;          ///< Wall time of the whole.
+    /// One a mesh that was asked for, in the scene's order; meshes without a single face are left out.
+    std::vector<MeshBake> meshes;
+    double seconds = 0.0;  ///< Wall time of the whole.
 };
 
 /// Bakes what `folder` does not already hold with the same source, settings and version, and writes it there;

@@ -9,6 +9,7 @@
 #include <unordered_set>
 
 #include "core/support/parallel.h"
+#include "sdf/surface_samples.h"
 #include "sdf/winding_number.h"
 
 namespace sdf {
@@ -131,38 +132,6 @@ bool every_edge_balances(const CleanMesh& mesh, const std::vector<std::uint32_t>
     return std::all_of(balance.begin(), balance.end(), [](const auto& edge) { return edge.second == 0; });
 }
 
-/// Points spread evenly over the area of some triangles, with their normals.
-struct SurfaceSample {
-    glm::dvec3 position;
-    glm::dvec3 normal;
-};
-
-std::vector<SurfaceSample> sample_surface(const std::vector<Triangle>& triangles, std::size_t count) {
-    std::vector<double> cumulative(triangles.size());
-    double total = 0.0;
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-        total += 0.5 * glm::length(triangles[i].scaled_normal());
-        cumulative[i] = total;
-    }
-    std::vector<SurfaceSample> samples;
-    samples.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        const double target = (static_cast<double>(i) + 0.5) / static_cast<double>(count) * total;
-        const auto found = std::upper_bound(cumulative.begin(), cumulative.end() - 1, target);
-        const Triangle& triangle = triangles[static_cast<std::size_t>(found - cumulative.begin())];
-        // The additive recurrence of the plastic number, folded into the triangle.
-        double u = std::fmod(0.5 + static_cast<double>(i) * 0.7548776662466927, 1.0);
-        double v = std::fmod(0.5 + static_cast<double>(i) * 0.5698402909980532, 1.0);
-        if (u + v > 1.0) {
-            u = 1.0 - u;
-            v = 1.0 - v;
-        }
-        samples.push_back({triangle.a + u * (triangle.b - triangle.a) + v * (triangle.c - triangle.a),
-                           glm::normalize(triangle.scaled_normal())});
-    }
-    return samples;
-}
-
 /// An open component is a solid with holes if, nearly everywhere, one side is clearly wound round and the
 /// other clearly not. A bare |w| >= 0.5 would do for flat sheets only: any bulge lifts one side of an open
 /// sheet above it, and the cap that closes such a "solid" then hugs the sheet itself. Hence the margin.
@@ -170,7 +139,7 @@ bool encloses_volume(const std::vector<Triangle>& triangles) {
     constexpr double kOffsetVoxels = 0.25, kMargin = 0.15, kNeeded = 0.9;
     constexpr std::size_t kMostSamples = 256, kFewTriangles = 256;
     const std::size_t count = std::min(kMostSamples, 16 + 4 * triangles.size());
-    const std::vector<SurfaceSample> samples = sample_surface(triangles, count);
+    const SurfaceSamples samples(triangles, count);
 
     std::vector<std::uint32_t> all(triangles.size());
     std::iota(all.begin(), all.end(), 0u);
@@ -178,7 +147,8 @@ bool encloses_volume(const std::vector<Triangle>& triangles) {
     const WindingNumber fast(tree);
     const double beta = triangles.size() <= kFewTriangles ? std::numeric_limits<double>::infinity() : 2.0;
     std::size_t clear = 0;
-    for (const SurfaceSample& sample : samples) {
+    for (std::size_t i = 0; i < count; ++i) {
+        const SurfaceSample sample = samples.at(i);
         const double front = std::abs(fast.at(sample.position + kOffsetVoxels * sample.normal, beta));
         const double back = std::abs(fast.at(sample.position - kOffsetVoxels * sample.normal, beta));
         if (std::min(front, back) < 0.5 - kMargin && std::max(front, back) >= 0.5 + kMargin) ++clear;

@@ -86,8 +86,7 @@ RayMarch::RayMarch(const BrickGrid& grid, const glm::dvec3& origin, const glm::d
       direction_(direction),
       inverse_(finite_inverse(direction)),
       t_end_(t_max) {
-    cell_limit_ =
-        glm::ivec3(grid.traced_voxels().empty() ? glm::dvec3(0.0) : grid.traced_voxels().maximum);
+    cell_limit_ = glm::ivec3(grid.traced_voxels().empty() ? glm::dvec3(0.0) : grid.traced_voxels().maximum);
     is_done_ = !(t_min <= t_max) || cell_limit_.x == 0;
     if (is_done_) return;
     speed_ = glm::length(direction);
