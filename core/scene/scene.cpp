@@ -141,7 +141,8 @@ bool has_emissive_surface(const Scene& scene) {
         const Mesh& mesh = scene.meshes[instance.mesh];
         for (std::size_t part = 0; part < mesh.parts.size(); ++part) {
             if (mesh.parts[part].triangle_count == 0) continue;
-            if (scene.materials[instance.materials[part]].emissive()) return true;
+            const Material& material = scene.materials[instance.materials[part]];
+            if (material.emissive() && !material.unlit) return true;
         }
     }
     return false;

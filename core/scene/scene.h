@@ -83,7 +83,7 @@ DoubleBounds world_bounds(const Scene& scene);
 /// Triangles drawn, instances counted.
 std::uint64_t drawn_triangle_count(const Scene& scene);
 
-/// Whether any instance's material emits, over `emissive()` materials that are in use.
+/// Whether any surface is meant as a light: emits, and not merely by being unlit.
 bool has_emissive_surface(const Scene& scene);
 
 /// 128-bit hash, in hex, of everything that decides a picture (geometry, materials, textures, lights, sky),

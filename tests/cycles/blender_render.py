@@ -1,11 +1,11 @@
 """Renders a GLB with Blender's Cycles as a plain path tracer. Runs inside Blender:
 
-    blender --background --factory-startup --python blender_render.py -- JOB.json
+    blender --background --factory-startup --python-exit-code 1 --python blender_render.py -- JOB.json
 
 JOB.json: {"scene": GLB, "camera": name or null, "size": [w, h], "samples": n, "bounces": n or -1,
 "sky": [r, g, b], "threads": n, "seeds": [..], "output": "prefix"}. Writes prefix.SEED.exr (32-bit, linear, cd/m^2) for each
-seed and prefix.json with the seconds of each, and of a picture of one sample, which is what a render costs before
-the first ray.
+seed and prefix.json with the seconds of each (wall and processor), and those of a picture of one sample, which is what a
+render costs before the first ray.
 
 Blender's importer gives geometry, nodes and lights. Materials are set again from the file, since the importer's Principled
 material adds a specular layer that a Lambert surface does not have.
@@ -75,6 +75,8 @@ def import_scene(job):
             light.angle = 0.0
         else:
             light.shadow_soft_size = 0.0
+    for placed in bpy.data.objects:
+        placed.cycles.shadow_terminator_geometry_offset = 0.0
 
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("sky")
@@ -129,12 +131,12 @@ def plain_path_tracing(scene, job):
 
 
 def timed_render(scene, samples, seed, output):
+    """Wall and processor seconds of the render alone, without writing the file."""
     scene.cycles.samples = samples
     scene.cycles.seed = seed
-    scene.render.filepath = output
-    start = time.perf_counter()
-    bpy.ops.render.render(write_still=False)
-    seconds = time.perf_counter() - start
+    wall, processor = time.perf_counter(), time.process_time()
+    bpy.ops.render.render()
+    seconds = time.perf_counter() - wall, time.process_time() - processor
     bpy.data.images["Render Result"].save_render(output, scene=scene)
     return seconds
 
@@ -144,15 +146,10 @@ def main():
         job = json.load(file)
     scene = import_scene(job)
     plain_path_tracing(scene, job)
-    overhead = min(timed_render(scene, 1, seed, job["output"] + ".one_sample.exr") for seed in (1, 2))
-    seconds = [timed_render(scene, job["samples"], seed, f"{job['output']}.{seed}.exr") for seed in job["seeds"]]
+    first = [timed_render(scene, 1, seed, job["output"] + ".one_sample.exr") for seed in (1, 2)]
+    all_samples = [timed_render(scene, job["samples"], seed, f"{job['output']}.{seed}.exr") for seed in job["seeds"]]
     with open(job["output"] + ".json", "w") as file:
-        json.dump({"blender": bpy.app.version_string, "one_sample_seconds": overhead, "seconds": seconds}, file)
+        json.dump({"blender": bpy.app.version_string, "one_sample": min(first), "renders": all_samples}, file)
 
 
-try:
-    main()
-except Exception:
-    import traceback
-    traceback.print_exc()
-    sys.exit(1)
+main()
