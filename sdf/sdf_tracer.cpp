@@ -7,16 +7,20 @@
 #include <limits>
 #include <set>
 
+#include "core/support/parallel.h"
 #include "core/trace/surface.h"
+#include "sdf/border_edges.h"
+#include "sdf/cell_triangles.h"
 #include "sdf/transform_scale.h"
-#include "sdf/triangle_bvh.h"
 
 namespace sdf {
 
 namespace {
 
-/// What the cubic solver is held to, in voxels.
-constexpr double kTraceErrorVoxels = 1e-3;
+/// How far off a solid's surface rays start that leave it. The solver's own error is far smaller; this clears
+/// the facets of the trilinear surface, which rise 1 / 8r over the smooth surface that the normal belongs to,
+/// r its radius in voxels.
+constexpr double kSurfaceClearanceVoxels = 0.05;
 
 /// A crossing farther than this from every stored triangle is the lid with which the winding number closes a
 /// hole of the mesh, and no surface. Where the sign changes at the mesh, the surface passes through the cell,
@@ -27,13 +31,22 @@ constexpr double kFarthestTriangleVoxels = 2.0;
 /// the shell of a flat sheet is found at 0.32 to 0.78 voxels, surfaces of solids nearer than 0.2.
 constexpr double kShellVoxels = 0.25;
 
+/// The shell's surface lies no farther than this from the plane of the triangle it stands for.
+constexpr double kShellReachVoxels = 0.9;
+
+/// No ray is taken to be within one shell for longer.
+constexpr double kShellPassageVoxels = 8.0;
+
 /// Room between a ray that leaves a shell and the shell.
 constexpr double kShellClearanceVoxels = 0.05;
 
-Triangle local_triangle(const core::Mesh& mesh, std::uint32_t index) {
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+glm::dvec3 triangle_normal(const core::Mesh& mesh, std::uint32_t index) {
     const glm::uvec3& corners = mesh.triangles[index];
-    return {glm::dvec3(mesh.positions[corners.x]), glm::dvec3(mesh.positions[corners.y]),
-            glm::dvec3(mesh.positions[corners.z])};
+    const glm::dvec3 a(mesh.positions[corners.x]);
+    return glm::normalize(
+        glm::cross(glm::dvec3(mesh.positions[corners.y]) - a, glm::dvec3(mesh.positions[corners.z]) - a));
 }
 
 /// Four units in the last place of a float of this magnitude.
@@ -51,7 +64,9 @@ struct SdfTracer::LocalRay {
     const core::Mesh& mesh;
     glm::dvec3 origin;     ///< Voxel coordinates.
     glm::dvec3 direction;  ///< Voxels a world unit.
-    bool has_entered_shell = false;
+    /// From where on the ray may have come into a shell without meeting its surface: at first its start, for
+    /// it may start within one.
+    double unmet_since;
 };
 
 /// The nearest visible crossing so far.
@@ -78,6 +93,13 @@ struct SdfTracer::Work {
 SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids)
     : scene_(scene), grids_(std::move(grids)), has_alpha_(core::has_alpha(scene)) {
     assert(grids_.size() == scene.meshes.size());
+    borders_.resize(grids_.size());
+    core::parallel_for(grids_.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (!grids_[i] || grids_[i]->half_thickness_voxels() == 0.0) continue;
+            borders_[i] = find_border_edges({scene.meshes[i].positions, scene.meshes[i].triangles});
+        }
+    });
     std::vector<core::DoubleBounds> boxes(scene.instances.size());
     placed_.resize(scene.instances.size());
     for (std::size_t i = 0; i < scene.instances.size(); ++i) {
@@ -87,6 +109,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         const double h = grid->voxel_size();
         PlacedGrid& placed = placed_[i];
         placed.grid = grid;
+        placed.borders = &borders_[instance.mesh];
         placed.voxel_from_world_direction = glm::dmat3(instance.local_from_world) / h;
         placed.voxel_origin = (glm::dvec3(instance.local_from_world[3]) - grid->origin()) / h;
         placed.world_from_voxel_scale = largest_singular_value(glm::dmat3(instance.world_from_local)) * h;
@@ -104,66 +127,67 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
     tree_ = InstanceTree(boxes);
 }
 
-bool SdfTracer::resolve(const LocalRay& ray, const Crossing& crossing, Nearest& found) const {
+bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const {
     const BrickGrid& grid = *ray.placed.grid;
-    const Brick& brick = grid.brick_at(crossing.brick);
-    const glm::ivec3 local = crossing.cell - crossing.cell / kBrickCells * kBrickCells;
-    const glm::dvec3 voxel_point = glm::dvec3(crossing.cell) + crossing.point;
-    const glm::dvec3 point = grid.origin() + grid.voxel_size() * voxel_point;
+    const double h = grid.voxel_size();
+    const glm::ivec3 cell = crossing.cell - crossing.cell / kBrickCells * kBrickCells;
+    const CellTriangles triangles(ray.mesh, grid.brick_at(crossing.brick), cell);
+    const glm::dvec3 point = grid.origin() + h * (glm::dvec3(crossing.cell) + crossing.point);
+    TriangleHit hit = triangles.closest(point);
+    if (!hit) return false;
+    const bool is_inflated = grid.is_inflated(triangles.index(hit));
+    const double farthest = kFarthestTriangleVoxels + (is_inflated ? kHalfThicknessVoxels : 0.0);
+    if (hit.distance > farthest * h) return false;
+    found.is_shell = is_inflated && hit.distance > kShellVoxels * h;
+    if (found.is_shell && !resolve_shell(ray, crossing.t, point, triangles, hit)) return false;
 
-    std::array<std::int32_t, 8> candidates;
-    for (int i = 0; i < 8; ++i) {
-        candidates[static_cast<std::size_t>(i)] = brick.triangle[static_cast<std::size_t>(
-            Brick::index(local.x + (i >> 2), local.y + (i >> 1 & 1), local.z + (i & 1)))];
-    }
-    double nearest_squared = std::numeric_limits<double>::infinity();
-    std::int32_t triangle = -1;
-    TrianglePoint nearest_point;
-    for (std::size_t i = 0; i < 8; ++i) {
-        const std::int32_t candidate = candidates[i];
-        if (candidate < 0 ||
-            std::find(candidates.begin(), candidates.begin() + i, candidate) != candidates.begin() + i) {
-            continue;
-        }
-        const TrianglePoint closest =
-            closest_point(local_triangle(ray.mesh, static_cast<std::uint32_t>(candidate)), point);
-        const glm::dvec3 offset = point - closest.position;
-        const double squared = glm::dot(offset, offset);
-        if (squared < nearest_squared || (squared == nearest_squared && candidate < triangle)) {
-            nearest_squared = squared;
-            nearest_point = closest;
-            triangle = candidate;
-        }
-    }
-    if (triangle < 0) return false;
-    const auto index = static_cast<std::uint32_t>(triangle);
-    const bool is_inflated = grid.is_inflated(index);
-    const double distance_voxels = std::sqrt(nearest_squared) / grid.voxel_size();
-    if (distance_voxels > kFarthestTriangleVoxels + (is_inflated ? kHalfThicknessVoxels : 0.0)) return false;
-
-    const Triangle corners = local_triangle(ray.mesh, index);
-    // Directions in voxels and in local units differ by h alone, which no sign below depends on.
-    found.is_shell = is_inflated && distance_voxels > kShellVoxels;
-    if (found.is_shell) {
-        if (glm::dot(point - nearest_point.position, ray.direction) > 0.0) {
-            // The ray leaves a shell. It has met the sheet itself only if it started inside the shell, on
-            // the other side.
-            if (ray.has_entered_shell) return false;
-            const glm::dvec3 origin = grid.origin() + grid.voxel_size() * ray.origin;
-            const double t = intersect(corners, origin, grid.voxel_size() * ray.direction);
-            if (!(t >= ray.world.t_min && t <= crossing.t)) return false;
-        }
-    }
-    found.barycentrics = nearest_point.barycentrics;
-    if (has_alpha_ &&
-        !core::is_visible(scene_, ray.instance, index, glm::vec2(found.barycentrics), ray.world.seed)) {
+    found.triangle = triangles.index(hit);
+    found.barycentrics = hit.point.barycentrics;
+    if (has_alpha_ && !core::is_visible(scene_, ray.instance, found.triangle, glm::vec2(found.barycentrics),
+                                        ray.world.seed)) {
         return false;
     }
     found.t = crossing.t;
     found.instance = ray.instance;
-    found.triangle = index;
-    found.is_front = glm::dot(ray.direction, corners.scaled_normal()) < 0.0;
+    // Directions in voxels and in local units differ by h alone, which no sign depends on.
+    found.is_front = glm::dot(ray.direction, triangles.corners(hit).scaled_normal()) < 0.0;
     found.crossing = crossing;
+    return true;
+}
+
+/// Whether a crossing of a thickened shell is a hit of the surface within, and at which of its triangles.
+bool SdfTracer::resolve_shell(LocalRay& ray, double t, const glm::dvec3& point,
+                              const CellTriangles& triangles, TriangleHit& hit) const {
+    const BrickGrid& grid = *ray.placed.grid;
+    const double h = grid.voxel_size();
+    const glm::dvec3 origin = grid.origin() + h * ray.origin;
+    const glm::dvec3 direction = h * ray.direction;
+    const double reach = kShellReachVoxels * h;
+    const bool leaves = glm::dot(point - hit.point.position, ray.direction) > 0.0;
+    if (leaves) {
+        // Only what lies between here and the place where the ray came to be in the shell without having met
+        // anything: its start, or the rim.
+        const TriangleHit met = triangles.first_met(origin, direction, ray.unmet_since, t, point, reach);
+        ray.unmet_since = kNever;
+        if (met) hit = met;
+        return static_cast<bool>(met);
+    }
+    const double t_far = t + kShellPassageVoxels / glm::length(ray.direction);
+    const TriangleHit met = triangles.first_met(origin, direction, t, t_far, point, reach);
+    if (met) {
+        // The point that the ray truly meets: alpha and uv as they are on triangles. If it turns out
+        // transparent, another triangle within the same shell may still be met.
+        hit = met;
+        ray.unmet_since = std::nextafter(met.t, kNever);
+        return true;
+    }
+    const std::vector<std::uint8_t>& borders = *ray.placed.borders;
+    if (passes_beyond_border(triangles.corners(hit), borders[triangles.index(hit)], hit.point, origin,
+                             direction)) {
+        ray.unmet_since = t;
+        return false;
+    }
+    ray.unmet_since = kNever;
     return true;
 }
 
@@ -175,7 +199,8 @@ void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nea
                    placed,
                    scene_.meshes[scene_.instances[instance].mesh],
                    placed.voxel_from_world_direction * glm::dvec3(ray.origin) + placed.voxel_origin,
-                   placed.voxel_from_world_direction * glm::dvec3(ray.direction)};
+                   placed.voxel_from_world_direction * glm::dvec3(ray.direction),
+                   ray.t_min};
     double t_min = ray.t_min, t_max = nearest.t;
     if (!clip_to_box(placed.grid->traced_voxels(), local.origin, finite_inverse(local.direction), t_min,
                      t_max)) {
@@ -190,7 +215,6 @@ void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nea
             if (found.t < nearest.t || !nearest.found() || instance < nearest.instance) nearest = found;
             break;
         }
-        local.has_entered_shell = local.has_entered_shell || found.is_shell;
     }
     work.ray_steps += march.steps();
     work.ray_exhausted = work.ray_exhausted || march.is_exhausted();
@@ -202,7 +226,7 @@ core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const 
     glm::dvec3 gradient = smooth_gradient(grid, nearest.crossing.cell, nearest.crossing.point);
     if (!(glm::length(gradient) >= 1e-6)) {
         const core::Mesh& mesh = scene_.meshes[scene_.instances[nearest.instance].mesh];
-        gradient = glm::normalize(local_triangle(mesh, nearest.triangle).scaled_normal());
+        gradient = triangle_normal(mesh, nearest.triangle);
         if ((glm::dot(gradient, placed.voxel_from_world_direction * glm::dvec3(ray.direction)) < 0.0) !=
             nearest.crossing.enters_negative) {
             gradient = -gradient;
@@ -229,7 +253,7 @@ core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const 
     const glm::dvec3 origin(ray.origin);
     const glm::dvec3 position = origin + nearest.t * direction;
     const double magnitude = std::max({glm::length(position), glm::length(origin), nearest.t});
-    double clearance_voxels = 2.0 * kTraceErrorVoxels;
+    double clearance_voxels = kSurfaceClearanceVoxels;
     if (nearest.is_shell) clearance_voxels = grid.half_thickness_voxels() + kShellClearanceVoxels;
     hit.offset =
         static_cast<float>(std::max(clearance_voxels * placed.world_from_voxel_scale, four_ulp(magnitude)));
@@ -302,6 +326,7 @@ std::size_t SdfTracer::bytes() const {
     for (const auto& grid : grids_) {
         if (grid && counted.insert(grid.get()).second) total += grid->bytes();
     }
+    for (const auto& borders : borders_) total += borders.capacity();
     return total;
 }
 

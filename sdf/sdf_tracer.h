@@ -14,6 +14,7 @@
 #include "core/scene/scene.h"
 #include "core/trace/tracer.h"
 #include "sdf/brick_grid.h"
+#include "sdf/cell_triangles.h"
 #include "sdf/instance_tree.h"
 #include "sdf/sphere_trace.h"
 
@@ -50,6 +51,7 @@ private:
     /// One instance, ready for rays.
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
+        const std::vector<std::uint8_t>* borders = nullptr;  ///< Of the mesh, by triangle.
         glm::dmat3 voxel_from_world_direction{1.0};
         glm::dvec3 voxel_origin{0.0};         ///< Voxel coordinates of the world's origin.
         double world_from_voxel_scale = 1.0;  ///< Largest stretch of one voxel, in world units.
@@ -64,12 +66,15 @@ private:
     /// Looks for the first visible crossing of one instance before the nearest hit so far.
     void trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest, Work& work) const;
     /// Finds the triangle of a crossing; false where there is no visible surface.
-    bool resolve(const LocalRay& ray, const Crossing& crossing, Nearest& found) const;
+    bool resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const;
+    bool resolve_shell(LocalRay& ray, double t, const glm::dvec3& point, const CellTriangles& triangles,
+                       TriangleHit& hit) const;
     core::Hit finish(const core::Ray& ray, const Nearest& nearest) const;
     void count(const Work& work) const;
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;
+    std::vector<std::vector<std::uint8_t>> borders_;  ///< By mesh; empty where nothing is thickened.
     std::vector<PlacedGrid> placed_;
     InstanceTree tree_;
     bool has_alpha_ = false;

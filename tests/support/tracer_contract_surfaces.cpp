@@ -267,7 +267,10 @@ TEST_P(TracerContract, SurfacesAreThoseOfTheStoredTriangles) {
         const double degrees =
             glm::degrees(std::acos(std::clamp(double(glm::dot(a.frame.normal, b.frame.normal)), -1.0, 1.0)));
         EXPECT_LE(degrees, glm::degrees(s / 0.4) + 0.1) << "ray " << i;
-        EXPECT_NEAR(a.roughness, b.roughness, s / 2.5 + 1e-3) << "ray " << i;
+        // At the seam uv.y jumps from 1 to 0, and the ramp from its last value to its first.
+        const double full_turn = 4.0 * 63.0 / 255.0;
+        const double apart = std::abs(a.roughness - b.roughness);
+        EXPECT_LE(std::min(apart, std::abs(full_turn - apart)), s / 2.5 + 1e-3) << "ray " << i;
         EXPECT_GT(glm::dot(b.frame.normal, -rays.get(i).direction), 0.0f);
     }
     EXPECT_GT(compared, 1000);
