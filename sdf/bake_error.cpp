@@ -43,14 +43,14 @@ std::size_t sample_count(const std::vector<Triangle>& corners) {
 
 }  // namespace
 
-ErrorFigures measure_error(const std::vector<Triangle>& corners, const std::vector<std::uint8_t>& inflated,
+ErrorFigures measure_error(const std::vector<Triangle>& corners, const std::vector<Feature>& features,
                            const WindingNumber& winding, const LeafMap& field) {
     const SurfaceSamples samples(corners, sample_count(corners));
     std::vector<double> errors(sample_count(corners));
     core::parallel_for(errors.size(), 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const SurfaceSample sample = samples.at(i);
-            errors[i] = error_at(sample, inflated[sample.triangle] != 0, winding, field);
+            errors[i] = error_at(sample, features[sample.triangle] != Feature::kSurface, winding, field);
         }
     });
     std::erase_if(errors, [](double error) { return error < 0.0; });

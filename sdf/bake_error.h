@@ -11,10 +11,10 @@
 
 namespace sdf {
 
-/// |field| at points spread evenly over the mesh, in voxels; on inflated triangles how far that is from the
-/// half-thickness. Points that lie within the union of the solids are no surface and do not count.
-/// @param corners triangles in voxels; @param inflated one entry a triangle; @param field values in voxels.
-ErrorFigures measure_error(const std::vector<Triangle>& corners, const std::vector<std::uint8_t>& inflated,
+/// |field| at points spread evenly over the mesh, in voxels; on sheets and thin walls how far that is from
+/// the half-thickness. Points that lie within the union of the solids are no surface and do not count.
+/// @param corners triangles in voxels; @param features one entry a triangle; @param field values in voxels.
+ErrorFigures measure_error(const std::vector<Triangle>& corners, const std::vector<Feature>& features,
                            const WindingNumber& winding, const LeafMap& field);
 
 }  // namespace sdf

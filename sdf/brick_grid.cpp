@@ -50,7 +50,7 @@ std::int64_t gap_squared(int offset) {
 
 }  // namespace
 
-BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), inflated_(field.inflated) {
+BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), features_(field.features) {
     const LeafMap map(field.leaves);
     std::vector<LeafMask> occupied(field.leaves.size());
     core::parallel_for(field.leaves.size(), 8, [&](std::size_t begin, std::size_t end) {
@@ -172,7 +172,7 @@ core::DoubleBounds BrickGrid::local_bounds() const {
 
 std::size_t BrickGrid::bytes() const {
     return sizeof(*this) + top_.capacity() * sizeof(top_[0]) + bricks_.capacity() * sizeof(Brick) +
-           inflated_.capacity();
+           features_.capacity();
 }
 
 }  // namespace sdf

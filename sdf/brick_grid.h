@@ -57,14 +57,23 @@ public:
         const std::int32_t entry = top_[block_index(block)];
         return entry >= 0 ? &bricks_[static_cast<std::size_t>(entry)] : nullptr;
     }
+    /// The brick that holds a cell, or nothing in empty blocks and outside the grid.
+    const Brick* brick_or_null(const glm::ivec3& cell) const {
+        if (cell.x < 0 || cell.y < 0 || cell.z < 0) return nullptr;
+        const glm::ivec3 block = cell / kBrickCells;
+        if (block.x >= block_count_.x || block.y >= block_count_.y || block.z >= block_count_.z)
+            return nullptr;
+        return brick(block);
+    }
     /// Entry of the top grid: a brick number if >= 0, else see empty_distance().
     std::int32_t entry(const glm::ivec3& block) const { return top_[block_index(block)]; }
     const Brick& brick_at(std::int32_t entry) const { return bricks_[static_cast<std::size_t>(entry)]; }
     /// Voxels from anywhere in an empty block to the nearest occupied cell, rounded down.
     static double empty_distance(std::int32_t entry) { return -(entry + 1) * kDistanceStep; }
 
-    /// Whether the triangle is represented with the half-thickness.
-    bool is_inflated(std::uint32_t triangle) const { return !inflated_.empty() && inflated_[triangle] != 0; }
+    Feature feature(std::uint32_t triangle) const {
+        return features_.empty() ? Feature::kSurface : features_[triangle];
+    }
     /// tau in voxels; 0 where nothing is inflated.
     double half_thickness_voxels() const { return info_.half_thickness / info_.voxel_size; }
 
@@ -86,7 +95,7 @@ private:
     core::DoubleBounds traced_voxels_;
     std::vector<std::int32_t> top_;
     std::vector<Brick> bricks_;
-    std::vector<std::uint8_t> inflated_;
+    std::vector<Feature> features_;
 };
 
 }  // namespace sdf

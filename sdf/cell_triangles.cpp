@@ -35,7 +35,8 @@ TriangleHit CellTriangles::closest(const glm::dvec3& point) const {
         const double squared = glm::dot(offset, offset);
         if (squared < best_squared) {
             best_squared = squared;
-            best.slot = i;
+            best.index = indices_[static_cast<std::size_t>(i)];
+            best.corners = corners_[static_cast<std::size_t>(i)];
             best.point = candidate;
         }
     }
@@ -52,7 +53,8 @@ TriangleHit CellTriangles::first_met(const glm::dvec3& origin, const glm::dvec3&
         if (!(std::abs(glm::dot(point - triangle.a, normal)) <= reach)) continue;
         const double t = intersect(triangle, origin, direction);
         if (!(t >= t_min && t <= t_max) || (best && t >= best.t)) continue;
-        best.slot = i;
+        best.index = indices_[static_cast<std::size_t>(i)];
+        best.corners = triangle;
         best.t = t;
         // On the triangle, so that the closest point is the point itself.
         best.point = closest_point(triangle, origin + t * direction);
@@ -61,30 +63,25 @@ TriangleHit CellTriangles::first_met(const glm::dvec3& origin, const glm::dvec3&
     return best;
 }
 
-bool passes_beyond_border(const Triangle& triangle, std::uint8_t borders, const TrianglePoint& closest,
-                          const glm::dvec3& origin, const glm::dvec3& direction) {
-    if (borders == 0) return false;
+PlanePassage pass_plane(const Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction) {
+    PlanePassage passage;
     const glm::dvec3 normal = triangle.scaled_normal();
     const double slope = glm::dot(direction, normal);
-    const glm::dvec3 weights_of_closest(1.0 - closest.barycentrics.x - closest.barycentrics.y,
-                                        closest.barycentrics.x, closest.barycentrics.y);
-    unsigned touched = 0;
-    for (int i = 0; i < 3; ++i) {
-        if (weights_of_closest[i] <= 0.0) touched |= 1u << i;
+    if (slope == 0.0) {
+        passage.point = origin;
+        passage.beyond = 7;
+        return passage;
     }
-    // A ray in the sheet's own plane sees its edge, which has no extent.
-    if (slope == 0.0) return (touched & borders) != 0;
-    const glm::dvec3 point = origin + glm::dot(triangle.a - origin, normal) / slope * direction;
+    passage.t = glm::dot(triangle.a - origin, normal) / slope;
+    passage.point = origin + passage.t * direction;
     const double inverse = 1.0 / glm::dot(normal, normal);
-    const double second = glm::dot(glm::cross(point - triangle.a, triangle.c - triangle.a), normal) * inverse;
-    const double third = glm::dot(glm::cross(triangle.b - triangle.a, point - triangle.a), normal) * inverse;
-    const glm::dvec3 weights(1.0 - second - third, second, third);
-    unsigned outside = 0;
-    for (int i = 0; i < 3; ++i) {
-        if (weights[i] < 0.0) outside |= 1u << i;
-    }
-    if (outside == 0) return false;
-    return (outside & ~borders) == 0 || (outside & borders & touched) != 0;
+    const glm::dvec3 offset = passage.point - triangle.a;
+    const double second = glm::dot(glm::cross(offset, triangle.c - triangle.a), normal) * inverse;
+    const double third = glm::dot(glm::cross(triangle.b - triangle.a, offset), normal) * inverse;
+    if (1.0 - second - third < 0.0) passage.beyond |= 1;
+    if (second < 0.0) passage.beyond |= 2;
+    if (third < 0.0) passage.beyond |= 4;
+    return passage;
 }
 
 }  // namespace sdf

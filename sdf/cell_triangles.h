@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <span>
 
 #include "core/scene/scene.h"
 #include "sdf/brick_grid.h"
@@ -14,12 +13,13 @@ namespace sdf {
 
 /// A point of one of a cell's triangles.
 struct TriangleHit {
-    int slot = -1;   ///< Into CellTriangles; < 0: none.
-    double t = 0.0;  ///< Ray parameter, of a met triangle only.
+    std::uint32_t index = kNoTriangle;  ///< Into the mesh's triangles.
+    Triangle corners;                   ///< Local units.
     TrianglePoint point;
+    double t = 0.0;         ///< Ray parameter, of a met triangle only.
     double distance = 0.0;  ///< From the crossing, local units.
 
-    explicit operator bool() const { return slot >= 0; }
+    explicit operator bool() const { return index != kNoTriangle; }
 };
 
 /// The distinct closest triangles of a cell's eight corners, ascending, in local units.
@@ -27,11 +27,6 @@ class CellTriangles {
 public:
     /// @param cell local coordinates within the brick
     CellTriangles(const core::Mesh& mesh, const Brick& brick, const glm::ivec3& cell);
-
-    std::uint32_t index(const TriangleHit& hit) const { return indices_[static_cast<std::size_t>(hit.slot)]; }
-    const Triangle& corners(const TriangleHit& hit) const {
-        return corners_[static_cast<std::size_t>(hit.slot)];
-    }
 
     /// The triangle closest to a point; the lowest number of equally near ones.
     TriangleHit closest(const glm::dvec3& point) const;
@@ -47,11 +42,14 @@ private:
     std::array<Triangle, 8> corners_;
 };
 
-/// Whether the ray passes a triangle beyond the border of its sheet, where only the sheet's thickened rim
-/// lies: it leaves the triangle's plane outside border edges alone, or outside the one that `closest` lies
-/// on.
-/// @param borders bits of find_border_edges for this triangle
-bool passes_beyond_border(const Triangle& triangle, std::uint8_t borders, const TrianglePoint& closest,
-                          const glm::dvec3& origin, const glm::dvec3& direction);
+/// Where a ray meets a triangle's plane, against the triangle's edges.
+struct PlanePassage {
+    glm::dvec3 point{0.0};
+    double t = 0.0;
+    /// Bit 0, 1, 2 where the point lies beyond the edge opposite the first, second, third corner. All three
+    /// for a ray in parallel to the plane.
+    std::uint8_t beyond = 0;
+};
+PlanePassage pass_plane(const Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction);
 
 }  // namespace sdf

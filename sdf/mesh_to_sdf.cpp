@@ -295,7 +295,11 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
         for (std::size_t i = begin; i < end; ++i) fill_leaf(sources, field.leaves[i]);
     });
 
-    std::vector<std::uint8_t> inflated_clean = sources.is_sheet;
+    std::vector<Feature> features;
+    features.reserve(sources.is_sheet.size());
+    for (const std::uint8_t is_sheet : sources.is_sheet) {
+        features.push_back(is_sheet ? Feature::kSheet : Feature::kSurface);
+    }
     bool has_thin_walls = false;
     if (sources.has_solids) {
         const ThinWalls walls =
@@ -303,7 +307,8 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
         has_thin_walls = !walls.pieces.empty();
         if (has_thin_walls) {
             thicken(walls, field.leaves);
-            for (const std::uint32_t triangle : walls.triangle_of_piece) inflated_clean[triangle] = 1;
+            for (const std::uint32_t triangle : walls.triangle_of_piece)
+                features[triangle] = Feature::kThinWall;
             const double wanted = 2.0 * longest / (walls.thickness * h);
             info.warnings.push_back(
                 fmt::format("{:.1f} % of the surface bounds walls too thin for the voxel of {:g} and is "
@@ -316,13 +321,12 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
     info.half_thickness = sources.has_sheets || has_thin_walls ? kHalfThicknessVoxels * h : 0.0;
     info.clean_level_set =
         sources.has_solids && !sources.has_sheets && sources.solids_are_closed && !has_thin_walls;
-    info.error_voxels =
-        measure_error(sources.corners, inflated_clean, *sources.winding, LeafMap(field.leaves));
+    info.error_voxels = measure_error(sources.corners, features, *sources.winding, LeafMap(field.leaves));
 
     if (info.half_thickness > 0.0) {
-        field.inflated.assign(mesh.triangles.size(), 0);
-        for (std::size_t i = 0; i < inflated_clean.size(); ++i) {
-            field.inflated[clean.source_triangle[i]] = inflated_clean[i];
+        field.features.assign(mesh.triangles.size(), Feature::kSurface);
+        for (std::size_t i = 0; i < features.size(); ++i) {
+            field.features[clean.source_triangle[i]] = features[i];
         }
     }
     to_local_units(clean, h, field.leaves);

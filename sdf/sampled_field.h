@@ -38,6 +38,13 @@ enum class MeshClass : std::uint8_t {
 /// "solid", "sheet" or "mixed", as reports and metadata spell it.
 std::string_view class_name(MeshClass value);
 
+/// How a triangle is represented.
+enum class Feature : std::uint8_t {
+    kSurface,   ///< By the zero of its signed distance.
+    kSheet,     ///< By its distance less the half-thickness.
+    kThinWall,  ///< In part or whole like a sheet: it bounds a solid too thin for the lattice there.
+};
+
 /// Distances between the mesh and the trilinear surface of its field, in voxels, over area-uniform samples.
 struct ErrorFigures {
     double mean = 0.0;
@@ -76,8 +83,8 @@ struct FieldLeaf {
 struct SampledField {
     FieldInfo info;
     std::vector<FieldLeaf> leaves;  ///< Sorted by origin (x, then y, then z).
-    /// One entry a source triangle: 1 where it is represented with the half-thickness.
-    std::vector<std::uint8_t> inflated;
+    /// One entry a source triangle; empty where all are Feature::kSurface.
+    std::vector<Feature> features;
 
     float background() const { return static_cast<float>(kBandVoxels * info.voxel_size); }
 };

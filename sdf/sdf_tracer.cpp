@@ -27,8 +27,9 @@ constexpr double kSurfaceClearanceVoxels = 0.05;
 /// whose diagonal is 1.74.
 constexpr double kFarthestTriangleVoxels = 2.0;
 
-/// Beyond this distance from its triangle a hit lies on the thickened shell and not on the surface itself:
-/// the shell of a flat sheet is found at 0.32 to 0.78 voxels, surfaces of solids nearer than 0.2.
+/// A triangle of a thin wall may be thickened in one place and not in another. Beyond this distance a hit
+/// lies on the thickened shell: that of a flat sheet is found at 0.32 to 0.78 voxels, plain surfaces nearer
+/// than 0.2.
 constexpr double kShellVoxels = 0.25;
 
 /// The shell's surface lies no farther than this from the plane of the triangle it stands for.
@@ -52,6 +53,14 @@ glm::dvec3 triangle_normal(const core::Mesh& mesh, std::uint32_t index) {
 /// Four units in the last place of a float of this magnitude.
 double four_ulp(double magnitude) {
     return 4.0 * magnitude * static_cast<double>(std::numeric_limits<float>::epsilon());
+}
+
+/// Whether the closest point lies on a border edge that the ray passes beyond.
+bool touches_border(const TriangleHit& hit, std::uint8_t beyond, std::uint8_t borders) {
+    const glm::dvec2& b = hit.point.barycentrics;
+    const unsigned touched =
+        (1.0 - b.x - b.y <= 0.0 ? 1u : 0u) | (b.x <= 0.0 ? 2u : 0u) | (b.y <= 0.0 ? 4u : 0u);
+    return (touched & beyond & borders) != 0;
 }
 
 }  // namespace
@@ -135,13 +144,15 @@ bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found)
     const glm::dvec3 point = grid.origin() + h * (glm::dvec3(crossing.cell) + crossing.point);
     TriangleHit hit = triangles.closest(point);
     if (!hit) return false;
-    const bool is_inflated = grid.is_inflated(triangles.index(hit));
-    const double farthest = kFarthestTriangleVoxels + (is_inflated ? kHalfThicknessVoxels : 0.0);
+    const Feature feature = grid.feature(hit.index);
+    const double farthest =
+        kFarthestTriangleVoxels + (feature == Feature::kSurface ? 0.0 : kHalfThicknessVoxels);
     if (hit.distance > farthest * h) return false;
-    found.is_shell = is_inflated && hit.distance > kShellVoxels * h;
+    found.is_shell =
+        feature == Feature::kSheet || (feature == Feature::kThinWall && hit.distance > kShellVoxels * h);
     if (found.is_shell && !resolve_shell(ray, crossing.t, point, triangles, hit)) return false;
 
-    found.triangle = triangles.index(hit);
+    found.triangle = hit.index;
     found.barycentrics = hit.point.barycentrics;
     if (has_alpha_ && !core::is_visible(scene_, ray.instance, found.triangle, glm::vec2(found.barycentrics),
                                         ray.world.seed)) {
@@ -150,7 +161,7 @@ bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found)
     found.t = crossing.t;
     found.instance = ray.instance;
     // Directions in voxels and in local units differ by h alone, which no sign depends on.
-    found.is_front = glm::dot(ray.direction, triangles.corners(hit).scaled_normal()) < 0.0;
+    found.is_front = glm::dot(ray.direction, hit.corners.scaled_normal()) < 0.0;
     found.crossing = crossing;
     return true;
 }
@@ -181,14 +192,51 @@ bool SdfTracer::resolve_shell(LocalRay& ray, double t, const glm::dvec3& point,
         ray.unmet_since = std::nextafter(met.t, kNever);
         return true;
     }
-    const std::vector<std::uint8_t>& borders = *ray.placed.borders;
-    if (passes_beyond_border(triangles.corners(hit), borders[triangles.index(hit)], hit.point, origin,
-                             direction)) {
+    if (passes_rim(ray, hit, origin, direction, t_far)) {
         ray.unmet_since = t;
         return false;
     }
-    ray.unmet_since = kNever;
     return true;
+}
+
+/// Whether a ray that comes into a shell near the triangle of `hit`, and meets none there, only passes the
+/// rim beyond the sheet's border. Follows the ray to where it comes through the sheet's plane, cell by cell,
+/// since a slanted ray does so some way off. If it meets a triangle there, `hit` becomes that.
+bool SdfTracer::passes_rim(LocalRay& ray, TriangleHit& hit, const glm::dvec3& origin,
+                           const glm::dvec3& direction, double t_far) const {
+    constexpr int kMostSteps = 4;
+    const BrickGrid& grid = *ray.placed.grid;
+    const double reach = kShellReachVoxels * grid.voxel_size();
+    ray.unmet_since = kNever;
+    TriangleHit near = hit;
+    for (int step = 0; step < kMostSteps; ++step) {
+        const PlanePassage passage = pass_plane(near.corners, origin, direction);
+        const std::uint8_t borders = (*ray.placed.borders)[near.index];
+        const bool beyond_border_alone = passage.beyond != 0 && (passage.beyond & ~borders) == 0;
+        // Parallel to the sheet: what is seen is its edge, which has no extent.
+        if (passage.beyond == 7) return borders != 0;
+        if (!(passage.t <= t_far)) return beyond_border_alone;
+        const glm::dvec3 voxel = (passage.point - grid.origin()) / grid.voxel_size();
+        const glm::ivec3 cell(glm::floor(voxel));
+        const Brick* brick = grid.brick_or_null(cell);
+        // Nothing is near the place where the ray comes through.
+        if (!brick) return (passage.beyond & borders) != 0;
+        const CellTriangles there(ray.mesh, *brick, cell - cell / kBrickCells * kBrickCells);
+        const TriangleHit met =
+            there.first_met(origin, direction, ray.world.t_min, t_far, passage.point, reach);
+        if (met) {
+            hit = met;
+            ray.unmet_since = std::nextafter(met.t, kNever);
+            return false;
+        }
+        const TriangleHit next = there.closest(passage.point);
+        if (!next) return (passage.beyond & borders) != 0;
+        if (next.index == near.index) {
+            return beyond_border_alone || touches_border(next, passage.beyond, borders);
+        }
+        near = next;
+    }
+    return false;
 }
 
 void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest,

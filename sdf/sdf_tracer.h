@@ -69,6 +69,8 @@ private:
     bool resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const;
     bool resolve_shell(LocalRay& ray, double t, const glm::dvec3& point, const CellTriangles& triangles,
                        TriangleHit& hit) const;
+    bool passes_rim(LocalRay& ray, TriangleHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
+                    double t_far) const;
     core::Hit finish(const core::Ray& ray, const Nearest& nearest) const;
     void count(const Work& work) const;
 

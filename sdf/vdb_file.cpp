@@ -16,7 +16,7 @@
 #include "core/support/atomic_file.h"
 #include "core/support/error.h"
 #include "core/support/hash.h"
-#include "sdf/inflated_ranges.h"
+#include "sdf/feature_ranges.h"
 
 namespace sdf {
 
@@ -68,8 +68,7 @@ std::string class_text(MeshClass value) {
     return std::string(class_name(value));
 }
 
-void write_metadata(const FieldInfo& info, const std::vector<std::uint8_t>& inflated,
-                    openvdb::MetaMap& metadata) {
+void write_metadata(const FieldInfo& info, const std::vector<Feature>& features, openvdb::MetaMap& metadata) {
     const auto text = [&](const char* name, const std::string& value) {
         metadata.insertMeta(name, openvdb::StringMetadata(value));
     };
@@ -89,7 +88,8 @@ void write_metadata(const FieldInfo& info, const std::vector<std::uint8_t>& infl
     text("fieldlight_source_hash", info.source_hash);
     text("fieldlight_settings_hash", info.settings_hash);
     text("fieldlight_warnings", fmt::format("{}", fmt::join(info.warnings, "\n")));
-    text("fieldlight_inflated_triangles", inflated_ranges(inflated));
+    text("fieldlight_sheet_triangles", feature_ranges(features, Feature::kSheet));
+    text("fieldlight_thin_wall_triangles", feature_ranges(features, Feature::kThinWall));
 }
 
 openvdb::math::Transform::Ptr make_transform(const FieldInfo& info) {
@@ -147,7 +147,7 @@ void write_field(const fs::path& path, const SampledField& field, const std::str
     distance->setName(kDistanceGrid);
     triangle->setName(kTriangleGrid);
     distance->setGridClass(info.clean_level_set ? openvdb::GRID_LEVEL_SET : openvdb::GRID_UNKNOWN);
-    write_metadata(info, field.inflated, *distance);
+    write_metadata(info, field.features, *distance);
     distance->insertMeta("fieldlight_mesh", openvdb::StringMetadata(name));
 
     core::write_file_atomically(path, [&](const fs::path& temporary) {
@@ -312,9 +312,14 @@ SampledField read_field(const fs::path& path) {
             return std::array{a.origin.x, a.origin.y, a.origin.z} <
                    std::array{b.origin.x, b.origin.y, b.origin.z};
         });
-        const auto ranges = MetadataReader(path, *distance).get<std::string>("fieldlight_inflated_triangles");
-        if (!parse_inflated_ranges(ranges, field.info.triangle_count, field.inflated)) {
-            fail(path, "metadata 'fieldlight_inflated_triangles' is no list of ranges of triangles");
+        const MetadataReader reader(path, *distance);
+        for (const auto& [name, feature] :
+             {std::pair{"fieldlight_sheet_triangles", Feature::kSheet},
+              std::pair{"fieldlight_thin_wall_triangles", Feature::kThinWall}}) {
+            if (!parse_feature_ranges(reader.get<std::string>(name), feature, field.info.triangle_count,
+                                      field.features)) {
+                fail(path, fmt::format("metadata '{}' is no list of ranges of triangles", name));
+            }
         }
     });
     return field;

@@ -342,10 +342,10 @@ void Job::sample_lights(Wave& wave, std::uint32_t path_index, const SurfacePoint
         return;
     }
     const glm::vec3 incoming = surface.frame.to_local(light.direction);
-    const glm::vec3 brdf_value = evaluate(surface.brdf, outgoing, incoming).sum();
+    const BrdfEvaluation brdf = evaluate(surface.brdf, outgoing, incoming);
+    const glm::vec3 brdf_value = brdf.value.sum();
     if (!any_positive(brdf_value)) return;
-    float weight = 1.0f;
-    if (!light.delta) weight = power_heuristic(light.pdf, pdf(surface.brdf, outgoing, incoming));
+    const float weight = light.delta ? 1.0f : power_heuristic(light.pdf, brdf.pdf);
     const glm::vec3 arriving =
         path.throughput * brdf_value * light.radiance * (incoming.z * weight / light.pdf);
     if (!any_positive(arriving)) return;

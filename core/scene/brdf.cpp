@@ -64,23 +64,21 @@ float specular_pdf(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3&
 BrdfValue evaluate_with_half(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming,
                              const glm::vec3& half) {
     const float weight = schlick_weight(glm::dot(outgoing, half));
-    BrdfValue value;
-    value.diffuse = brdf.diffuse * ((1.0f - dielectric_reflectance(brdf, weight)) / kPi);
-    if (has_specular(brdf)) {
-        const float visibility = 0.5f / (incoming.z * smith_root(outgoing.z, brdf.alpha) +
-                                         outgoing.z * smith_root(incoming.z, brdf.alpha));
-        value.specular =
-            (brdf.f0 + (brdf.f90 - brdf.f0) * weight) * (ggx_distribution(half, brdf.alpha) * visibility);
-    }
-    return value;
+    const float visibility = 0.5f / (incoming.z * smith_root(outgoing.z, brdf.alpha) +
+                                     outgoing.z * smith_root(incoming.z, brdf.alpha));
+    return {brdf.diffuse * ((1.0f - dielectric_reflectance(brdf, weight)) / kPi),
+            (brdf.f0 + (brdf.f90 - brdf.f0) * weight) * (ggx_distribution(half, brdf.alpha) * visibility)};
 }
 
 float pdf_with_half(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming,
                     const glm::vec3& half) {
     const float chance = specular_probability(brdf, outgoing.z);
-    float result = (1.0f - chance) * cosine_hemisphere_pdf(incoming.z);
-    if (chance > 0.0f) result += chance * specular_pdf(brdf, outgoing, half);
-    return result;
+    return (1.0f - chance) * cosine_hemisphere_pdf(incoming.z) + chance * specular_pdf(brdf, outgoing, half);
+}
+
+/// Without a coat there is no half vector to find.
+BrdfEvaluation lambert(const Brdf& brdf, const glm::vec3& incoming) {
+    return {{brdf.diffuse / kPi, glm::vec3(0.0f)}, cosine_hemisphere_pdf(incoming.z)};
 }
 
 glm::vec3 sample_visible_normal(const glm::vec3& outgoing, float alpha, const glm::vec2& u) {
@@ -110,23 +108,20 @@ Brdf make_brdf(const MaterialSample& material) {
     return brdf;
 }
 
-BrdfValue evaluate(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming) {
+BrdfEvaluation evaluate(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming) {
     if (!(outgoing.z > 0.0f) || !(incoming.z > 0.0f)) return {};
-    return evaluate_with_half(brdf, outgoing, incoming, glm::normalize(outgoing + incoming));
-}
-
-float pdf(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming) {
-    if (!(outgoing.z > 0.0f) || !(incoming.z > 0.0f)) return 0.0f;
-    return pdf_with_half(brdf, outgoing, incoming, glm::normalize(outgoing + incoming));
+    if (!has_specular(brdf)) return lambert(brdf, incoming);
+    const glm::vec3 half = glm::normalize(outgoing + incoming);
+    return {evaluate_with_half(brdf, outgoing, incoming, half),
+            pdf_with_half(brdf, outgoing, incoming, half)};
 }
 
 BrdfSample sample(const Brdf& brdf, const glm::vec3& outgoing, float u_lobe, const glm::vec2& u) {
     BrdfSample result;
     if (!(outgoing.z > 0.0f)) return result;
     const float chance = specular_probability(brdf, outgoing.z);
-    glm::vec3 half;
     if (u_lobe < chance) {
-        half = sample_visible_normal(outgoing, brdf.alpha, u);
+        const glm::vec3 half = sample_visible_normal(outgoing, brdf.alpha, u);
         result.incoming = 2.0f * glm::dot(outgoing, half) * half - outgoing;
         if (!(result.incoming.z > 0.0f)) return result;
         result.incoming = glm::normalize(result.incoming);
@@ -134,11 +129,10 @@ BrdfSample sample(const Brdf& brdf, const glm::vec3& outgoing, float u_lobe, con
         result.incoming = sample_cosine_hemisphere(u);
         if (!(result.incoming.z > 0.0f)) return result;
     }
-    // The half vector anew from both directions, so that value and pdf are bitwise those of evaluate() and
-    // pdf().
-    half = glm::normalize(outgoing + result.incoming);
-    result.pdf = pdf_with_half(brdf, outgoing, result.incoming, half);
-    result.value = evaluate_with_half(brdf, outgoing, result.incoming, half);
+    // Anew from both directions, so that value and pdf are bitwise those of evaluate().
+    const BrdfEvaluation evaluation = evaluate(brdf, outgoing, result.incoming);
+    result.value = evaluation.value;
+    result.pdf = evaluation.pdf;
     return result;
 }
 

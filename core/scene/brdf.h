@@ -36,10 +36,13 @@ struct BrdfValue {
     glm::vec3 specular{0.0f};
     glm::vec3 sum() const { return diffuse + specular; }
 };
-BrdfValue evaluate(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming);
 
-/// Solid-angle pdf with which sample() chooses `incoming`.
-float pdf(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming);
+/// The value for a pair of directions, and the solid-angle pdf with which sample() chooses `incoming`.
+struct BrdfEvaluation {
+    BrdfValue value;
+    float pdf = 0.0f;
+};
+BrdfEvaluation evaluate(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming);
 
 struct BrdfSample {
     glm::vec3 incoming{0.0f};

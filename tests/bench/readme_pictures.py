@@ -26,8 +26,6 @@ PICTURES = [
      ["--bounces", "3", "--sky", "{shared}/scenes/skies/spiaggia_di_mondello_1k.hdr", "--resolution", "256"]),
     ("menger_sponge", "{shared}/scenes/menger_sponge3/mengerSponge3.glb",
      ["--bounces", "4", "--sky", "300,400,600", "--sun", "30,50,20000", "--resolution", "256"]),
-    ("living_room", "{shared}/scenes/living_room_godot/living_room.glb",
-     ["--bounces", "3", "--sky", "3000,4000,6000", "--sun", "150,40,60000", "--resolution", "256"]),
 ]
 
 

@@ -33,7 +33,7 @@ void expect_equal_samples(const sdf::SampledField& a, const sdf::SampledField& b
                               sizeof(a.leaves[i].distance)),
                   0);
     }
-    EXPECT_EQ(a.inflated, b.inflated);
+    EXPECT_EQ(a.features, b.features);
     EXPECT_EQ(a.info.error_voxels.max, b.info.error_voxels.max);
 }
 
@@ -178,7 +178,7 @@ TEST(MeshToSdf, SheetsAreDistancesLessTheHalfThickness) {
         const double expected = std::min(brute_force_distance(triangles, position) - 0.55 * h, 4.0 * h);
         ASSERT_NEAR(value, expected, 1e-6 * h);
     });
-    EXPECT_EQ(field.inflated, std::vector<std::uint8_t>(mesh.triangles.size(), 1));
+    EXPECT_EQ(field.features, std::vector<sdf::Feature>(mesh.triangles.size(), sdf::Feature::kSheet));
 }
 
 TEST(MeshToSdf, WallsThinnerThanAVoxelAreThickenedAndNamed) {

@@ -78,7 +78,7 @@ TEST(VdbFile, ComesBackAsItWasWritten) {
     EXPECT_EQ(back.info.source_hash, "source");
     EXPECT_EQ(back.info.settings_hash, "settings");
     EXPECT_EQ(back.info.warnings, field.info.warnings);
-    EXPECT_EQ(back.inflated, field.inflated);
+    EXPECT_EQ(back.features, field.features);
     ASSERT_EQ(back.leaves.size(), field.leaves.size());
     for (std::size_t i = 0; i < field.leaves.size(); ++i) {
         ASSERT_EQ(back.leaves[i].origin, field.leaves[i].origin);
@@ -130,7 +130,7 @@ TEST(VdbFile, SheetsDoNotClaimToBeLevelSets) {
     EXPECT_EQ(grids[0].name, "distance");
     EXPECT_EQ(grids[0].grid_class, "unknown");
     EXPECT_EQ(grids[0].metadata.at("fieldlight_class"), "sheet");
-    EXPECT_EQ(grids[0].metadata.at("fieldlight_inflated_triangles"), "0-1");
+    EXPECT_EQ(grids[0].metadata.at("fieldlight_sheet_triangles"), "0-1");
 }
 
 TEST(VdbFile, SummaryTellsWhatIsThere) {
@@ -188,7 +188,7 @@ TEST(VdbFile, SpoiledFilesAreRefusedByName) {
         grid.insertMeta("fieldlight_voxel", openvdb::DoubleMetadata(std::nan("")));
     });
     refused("ranges of triangles", [](Distance& grid, Index&) {
-        grid.insertMeta("fieldlight_inflated_triangles", openvdb::StringMetadata("5-99999999999"));
+        grid.insertMeta("fieldlight_sheet_triangles", openvdb::StringMetadata("5-99999999999"));
     });
 }
 

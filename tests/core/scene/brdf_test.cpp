@@ -57,7 +57,7 @@ TEST_P(BrdfCase, SamplesFollowTheirDensity) {
             if (!(sample.pdf > 0.0f)) return std::nullopt;
             return sample.incoming;
         },
-        [&](const glm::vec3& d) { return core::pdf(brdf, outgoing, d); }, settings);
+        [&](const glm::vec3& d) { return core::evaluate(brdf, outgoing, d).pdf; }, settings);
     EXPECT_GT(p, tests::sidak_alpha(0.01, static_cast<int>(std::size(kCases))));
 }
 
@@ -70,8 +70,8 @@ TEST_P(BrdfCase, SampleAgreesWithEvaluateAndPdf) {
             core::sample(brdf, outgoing, static_cast<float>(random.uniform()),
                          {static_cast<float>(random.uniform()), static_cast<float>(random.uniform())});
         if (!(sample.pdf > 0.0f)) continue;
-        EXPECT_EQ(sample.pdf, core::pdf(brdf, outgoing, sample.incoming));
-        EXPECT_EQ(sample.value.sum(), core::evaluate(brdf, outgoing, sample.incoming).sum());
+        EXPECT_EQ(sample.pdf, core::evaluate(brdf, outgoing, sample.incoming).pdf);
+        EXPECT_EQ(sample.value.sum(), core::evaluate(brdf, outgoing, sample.incoming).value.sum());
     }
 }
 
@@ -81,8 +81,8 @@ TEST_P(BrdfCase, IsReciprocal) {
     for (int i = 0; i < 2000; ++i) {
         const glm::vec3 a(random.cosine_direction({0, 0, 1}));
         const glm::vec3 b(random.cosine_direction({0, 0, 1}));
-        const glm::vec3 forward = core::evaluate(brdf, a, b).sum();
-        const glm::vec3 backward = core::evaluate(brdf, b, a).sum();
+        const glm::vec3 forward = core::evaluate(brdf, a, b).value.sum();
+        const glm::vec3 backward = core::evaluate(brdf, b, a).value.sum();
         // reliability.md: reciprocity 1e-5.
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(forward[c], backward[c], 1e-5f * (1.0f + forward[c]));
     }
@@ -120,7 +120,8 @@ INSTANTIATE_TEST_SUITE_P(Materials, BrdfCase, testing::ValuesIn(kCases),
 TEST(Brdf, IsLambertWhereTheSpecularFactorIsZero) {
     const core::Brdf brdf = brdf_of({"", 0.0f, 1.0f, 0.0f, 0.0f});
     const glm::vec3 value =
-        core::evaluate(brdf, glm::normalize(glm::vec3(1, 2, 3)), glm::normalize(glm::vec3(-1, 0, 2))).sum();
+        core::evaluate(brdf, glm::normalize(glm::vec3(1, 2, 3)), glm::normalize(glm::vec3(-1, 0, 2)))
+            .value.sum();
     EXPECT_FLOAT_EQ(value.x, 0.8f / core::kPi);
     EXPECT_FLOAT_EQ(value.z, 0.2f / core::kPi);
 }

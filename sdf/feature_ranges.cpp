@@ -1,4 +1,4 @@
-#include "sdf/inflated_ranges.h"
+#include "sdf/feature_ranges.h"
 
 #include <fmt/format.h>
 
@@ -6,15 +6,15 @@
 
 namespace sdf {
 
-std::string inflated_ranges(const std::vector<std::uint8_t>& inflated) {
+std::string feature_ranges(const std::vector<Feature>& features, Feature feature) {
     std::string text;
-    for (std::size_t begin = 0; begin < inflated.size();) {
-        if (!inflated[begin]) {
+    for (std::size_t begin = 0; begin < features.size();) {
+        if (features[begin] != feature) {
             ++begin;
             continue;
         }
         std::size_t last = begin;
-        while (last + 1 < inflated.size() && inflated[last + 1]) ++last;
+        while (last + 1 < features.size() && features[last + 1] == feature) ++last;
         if (!text.empty()) text += ',';
         text += last == begin ? fmt::format("{}", begin) : fmt::format("{}-{}", begin, last);
         begin = last + 1;
@@ -22,10 +22,10 @@ std::string inflated_ranges(const std::vector<std::uint8_t>& inflated) {
     return text;
 }
 
-bool parse_inflated_ranges(std::string_view text, std::uint32_t count, std::vector<std::uint8_t>& inflated) {
-    inflated.clear();
+bool parse_feature_ranges(std::string_view text, Feature feature, std::uint32_t count,
+                          std::vector<Feature>& features) {
     if (text.empty()) return true;
-    inflated.assign(count, 0);
+    features.resize(count, Feature::kSurface);
     const char* cursor = text.data();
     const char* const end = text.data() + text.size();
     std::uint64_t lowest = 0;
@@ -42,7 +42,7 @@ bool parse_inflated_ranges(std::string_view text, std::uint32_t count, std::vect
             ++cursor;
             if (!number(last) || last < first) return false;
         }
-        for (std::uint64_t i = first; i <= last; ++i) inflated[i] = 1;
+        for (std::uint64_t i = first; i <= last; ++i) features[i] = feature;
         lowest = last + 1;
         if (cursor == end) return true;
         if (*cursor != ',') return false;
