@@ -1,6 +1,6 @@
 """Renders a GLB with Blender's Cycles as a plain path tracer. Runs inside Blender:
 
-    blender --background --factory-startup --python-exit-code 1 --python blender_render.py -- JOB.json
+    blender --background --factory-startup --python-exit-code 1 --python render_cycles.py -- JOB.json
 
 JOB.json: {"scene": GLB, "camera": name or null, "size": [w, h], "samples": n, "bounces": n or -1,
 "sky": [r, g, b], "threads": n, "seeds": [..], "output": "prefix"}. Writes prefix.SEED.exr (32-bit, linear, cd/m^2) for each
@@ -122,6 +122,7 @@ def plain_path_tracing(scene, job):
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.light_sampling_threshold = 0.0
     cycles.blur_glossy = 0.0
+    cycles.min_light_bounces = cycles.min_transparent_bounces = 0
     cycles.caustics_reflective = cycles.caustics_refractive = True
     cycles.film_exposure = 1.0
     cycles.pixel_filter_type = "BOX"
@@ -149,7 +150,7 @@ def main():
     first = [timed_render(scene, 1, seed, job["output"] + ".one_sample.exr") for seed in (1, 2)]
     all_samples = [timed_render(scene, job["samples"], seed, f"{job['output']}.{seed}.exr") for seed in job["seeds"]]
     with open(job["output"] + ".json", "w") as file:
-        json.dump({"blender": bpy.app.version_string, "one_sample": min(first), "renders": all_samples}, file)
+        json.dump({"blender": bpy.app.version_string, "one_sample": first, "renders": all_samples}, file)
 
 
 main()
