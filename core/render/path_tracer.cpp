@@ -102,7 +102,8 @@ public:
           scene_(inputs.scene),
           lights_(inputs.scene),
           camera_(inputs.camera, inputs.width, inputs.height),
-          film_(crop.width, crop.height, PathTracer::kBatchCount, inputs.aovs) {
+          batch_count_(inputs.aovs.count("Variance") ? PathTracer::kBatchCount : 1),
+          film_(crop.width, crop.height, batch_count_, inputs.aovs) {
         start_offsets_.resize(scene_.instances.size());
         for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
             start_offsets_[i] = inputs.tracer.start_offset(i);
@@ -142,6 +143,7 @@ private:
     const Scene& scene_;
     LightSampler lights_;
     CameraRays camera_;
+    const int batch_count_;  ///< Samples are dealt to that many independently scrambled sequences in turn.
     Film film_;
     std::vector<float> start_offsets_;
     std::array<std::atomic<std::int64_t>, kPassCount> nanoseconds_{};
@@ -233,7 +235,7 @@ void Job::render_tile(Wave& wave, int tile_x, int tile_y, int first_sample, int 
         const std::size_t index = static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(crop_.width) +
                                   static_cast<std::size_t>(pixel.x);
         for (int sample = first_sample; sample < first_sample + sample_count; ++sample, ++path) {
-            film_.add(index, sample % PathTracer::kBatchCount, wave.paths[path].result);
+            film_.add(index, sample % batch_count_, wave.paths[path].result);
         }
     }
 }
@@ -252,10 +254,10 @@ void Job::start_paths(Wave& wave, const std::vector<glm::ivec2>& pixels, int fir
         const auto pixel_key =
             static_cast<std::uint32_t>(film_pixel.y) * 0x10001u + static_cast<std::uint32_t>(film_pixel.x);
         for (int sample = first_sample; sample < first_sample + sample_count; ++sample, ++index) {
-            const auto batch = static_cast<std::uint32_t>(sample % PathTracer::kBatchCount);
+            const auto batch = static_cast<std::uint32_t>(sample % batch_count_);
             Path& path = wave.paths[index];
             path.sequence = SampleSequence(hash_words(seed_low, seed_high, pixel_key, batch),
-                                           static_cast<std::uint32_t>(sample / PathTracer::kBatchCount));
+                                           static_cast<std::uint32_t>(sample / batch_count_));
             Ray ray = camera_.ray(glm::vec2(film_pixel) + path.sequence.point(kFilm));
             ray.seed = path.sequence.bits(kAlpha);
             wave.rays.set(index, ray);
@@ -381,11 +383,12 @@ bool Job::scatter(Wave& wave, std::uint32_t path_index, const SurfacePoint& surf
         }
     }
     if (vertex >= kRouletteVertex) {
-        // Throughput alone decides, never the light: brighter lights must not change which paths live.
+        // Throughput alone decides, never the light: brighter lights must not change which paths live. Its
+        // root, because what a path carries says little about the light it will find.
         const float brightest = std::max({path.throughput.x, path.throughput.y, path.throughput.z});
         // Long paths die even where nothing is absorbed, or a white furnace would never end.
         const float most = vertex < kLongPathVertex ? 1.0f : kLongPathSurvival;
-        const float survival = std::clamp(brightest, kMinimumSurvival, most);
+        const float survival = std::clamp(std::sqrt(brightest), kMinimumSurvival, most);
         if (vertex_point(path, vertex, kRoulette).x >= survival) return false;
         path.throughput /= survival;
     }

