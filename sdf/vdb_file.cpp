@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of the files' layout and of what the samples mean; part of what decides whether a bake is used again.
-constexpr const char* kWriter = "fieldlight " FIELDLIGHT_VERSION " bake 2";
+constexpr const char* kWriter = "fieldlight " FIELDLIGHT_VERSION " bake 3";
 
 constexpr const char* kDistanceGrid = "distance";
 constexpr const char* kTriangleGrid = "triangle";
@@ -68,6 +68,13 @@ std::string class_text(MeshClass value) {
     return std::string(class_name(value));
 }
 
+/// File units per local unit: 1, but a power of two where voxels are so small that OpenVDB takes their
+/// transform for singular (it refuses a determinant under about 1e-15). Exact, so that nothing is rounded.
+double file_unit(double voxel_size) {
+    constexpr double kLeastVoxel = 1e-3;
+    return voxel_size >= kLeastVoxel ? 1.0 : std::exp2(std::ceil(std::log2(kLeastVoxel / voxel_size)));
+}
+
 void write_metadata(const FieldInfo& info, const std::vector<Feature>& features, openvdb::MetaMap& metadata) {
     const auto text = [&](const char* name, const std::string& value) {
         metadata.insertMeta(name, openvdb::StringMetadata(value));
@@ -78,6 +85,7 @@ void write_metadata(const FieldInfo& info, const std::vector<Feature>& features,
     text("fieldlight_writer", kWriter);
     text("fieldlight_class", class_text(info.mesh_class));
     number("fieldlight_voxel", info.voxel_size);
+    number("fieldlight_unit", file_unit(info.voxel_size));
     number("fieldlight_half_thickness", info.half_thickness);
     metadata.insertMeta("fieldlight_clean_level_set", openvdb::BoolMetadata(info.clean_level_set));
     metadata.insertMeta("fieldlight_triangle_count", openvdb::Int64Metadata(info.triangle_count));
@@ -93,8 +101,9 @@ void write_metadata(const FieldInfo& info, const std::vector<Feature>& features,
 }
 
 openvdb::math::Transform::Ptr make_transform(const FieldInfo& info) {
-    const auto transform = openvdb::math::Transform::createLinearTransform(info.voxel_size);
-    transform->postTranslate({info.origin.x, info.origin.y, info.origin.z});
+    const double unit = file_unit(info.voxel_size);
+    const auto transform = openvdb::math::Transform::createLinearTransform(unit * info.voxel_size);
+    transform->postTranslate({unit * info.origin.x, unit * info.origin.y, unit * info.origin.z});
     return transform;
 }
 
@@ -127,7 +136,8 @@ void make_identity_reproducible(const fs::path& path, const FieldInfo& info) {
 void write_field(const fs::path& path, const SampledField& field, const std::string& name) {
     initialize_openvdb();
     const FieldInfo& info = field.info;
-    const auto distance = openvdb::FloatGrid::create(field.background());
+    const auto unit = static_cast<float>(file_unit(info.voxel_size));
+    const auto distance = openvdb::FloatGrid::create(unit * field.background());
     const auto triangle = openvdb::Int32Grid::create(-1);
     for (const FieldLeaf& leaf : field.leaves) {
         const openvdb::Coord origin(leaf.origin.x, leaf.origin.y, leaf.origin.z);
@@ -136,7 +146,7 @@ void write_field(const fs::path& path, const SampledField& field, const std::str
         for (int i = 0; i < kLeafSize; ++i) {
             if (!leaf.is_active(i)) continue;
             const auto offset = static_cast<openvdb::Index>(i);
-            distance_leaf->setValueOn(offset, leaf.distance[offset]);
+            distance_leaf->setValueOn(offset, unit * leaf.distance[offset]);
             triangle_leaf->setValueOn(offset, leaf.triangle[offset]);
         }
     }
@@ -238,13 +248,14 @@ FieldInfo read_info(const fs::path& path, const openvdb::MetaMap& metadata) {
 
 void check_transform(const fs::path& path, const openvdb::math::Transform& transform, FieldInfo& info) {
     const openvdb::Vec3d voxel = transform.voxelSize();
+    const double unit = file_unit(info.voxel_size);
     if (!transform.isLinear() || !transform.hasUniformScale() || !(voxel[0] > 0.0) ||
-        !(std::abs(voxel[0] - info.voxel_size) <= 1e-12 * info.voxel_size)) {
+        !(std::abs(voxel[0] - unit * info.voxel_size) <= 1e-12 * unit * info.voxel_size)) {
         fail(path, fmt::format("the transform scales by ({}, {}, {}); a uniform {} is needed", voxel[0],
-                               voxel[1], voxel[2], info.voxel_size));
+                               voxel[1], voxel[2], unit * info.voxel_size));
     }
     const openvdb::Vec3d origin = transform.indexToWorld(openvdb::Vec3d(0.0));
-    info.origin = {origin[0], origin[1], origin[2]};
+    info.origin = {origin[0] / unit, origin[1] / unit, origin[2] / unit};
     if (!std::isfinite(info.origin.x + info.origin.y + info.origin.z)) {
         fail(path, "the transform is not finite");
     }
@@ -260,6 +271,7 @@ typename Grid::Ptr read_grid(const fs::path& path, openvdb::io::File& file, cons
 
 FieldLeaf read_leaf(const fs::path& path, const openvdb::FloatTree::LeafNodeType& distances,
                     const openvdb::Int32Tree& triangles, const FieldInfo& info, float background) {
+    const auto unit = static_cast<float>(file_unit(info.voxel_size));
     const openvdb::Coord origin = distances.origin();
     FieldLeaf leaf;
     leaf.origin = {origin.x(), origin.y(), origin.z()};
@@ -274,7 +286,7 @@ FieldLeaf read_leaf(const fs::path& path, const openvdb::FloatTree::LeafNodeType
     leaf.triangle.fill(-1);
     for (auto value = distances.cbeginValueOn(); value; ++value) {
         const auto i = static_cast<std::size_t>(value.pos());
-        const float sample = *value;
+        const float sample = *value / unit;
         if (!(std::abs(sample) <= background)) {
             fail(path, fmt::format("a sample is {}; all must be numbers within the background of {}", sample,
                                    background));
@@ -300,9 +312,10 @@ SampledField read_field(const fs::path& path) {
         field.info = read_info(path, *distance);
         check_transform(path, distance->transform(), field.info);
         const float background = field.background();
-        if (!(distance->background() > 0.0f) || distance->background() != background) {
+        const auto unit = static_cast<float>(file_unit(field.info.voxel_size));
+        if (!(distance->background() > 0.0f) || distance->background() != unit * background) {
             fail(path, fmt::format("the background is {}; {} voxels, {}, are needed", distance->background(),
-                                   kBandVoxels, background));
+                                   kBandVoxels, unit * background));
         }
         field.leaves.reserve(distance->tree().leafCount());
         for (auto leaf = distance->tree().cbeginLeaf(); leaf; ++leaf) {

@@ -3,6 +3,8 @@
 // Grid "distance" holds the samples (class level set only where it is one: closed, signed, nothing
 // inflated), grid "triangle" each active sample's closest source triangle. Everything of FieldInfo is
 // metadata of "distance", under names that start with `fieldlight_`. The same field gives the same bytes.
+// Coordinates and distances are the mesh's local ones times `fieldlight_unit`, which is 1 unless a voxel is
+// smaller than OpenVDB can hold.
 #pragma once
 
 #include <cstdint>

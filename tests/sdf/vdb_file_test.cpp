@@ -92,6 +92,29 @@ TEST(VdbFile, ComesBackAsItWasWritten) {
     }
 }
 
+TEST(VdbFile, HoldsVoxelsOfAnySizeExactly) {
+    // OpenVDB refuses a transform whose determinant is under about 1e-15, which is a voxel of 1e-5.
+    for (const double scale : {1e-8, 1e-3, 1.0, 1e6}) {
+        TemporaryFolder folder;
+        const fs::path path = folder.path() / "ball.vdb";
+        const sdf::SampledField written =
+            bake(moved(icosphere(2), scaling(glm::dvec3(scale)) * translation({0.3, 0.2, 0.1})), 16);
+        sdf::write_field(path, written, "ball");
+        const sdf::SampledField read = sdf::read_field(path);
+        EXPECT_EQ(read.info.voxel_size, written.info.voxel_size);
+        EXPECT_NEAR(read.info.origin.x / written.info.origin.x, 1.0, 1e-12);
+        ASSERT_EQ(read.leaves.size(), written.leaves.size());
+        for (std::size_t i = 0; i < read.leaves.size(); ++i) {
+            for (int j = 0; j < sdf::kLeafSize; ++j) {
+                if (!written.leaves[i].is_active(j)) continue;
+                ASSERT_EQ(read.leaves[i].distance[static_cast<std::size_t>(j)],
+                          written.leaves[i].distance[static_cast<std::size_t>(j)])
+                    << "scale " << scale;
+            }
+        }
+    }
+}
+
 TEST(VdbFile, TheSameFieldGivesTheSameBytes) {
     const TemporaryFolder folder;
     sdf::write_field(folder.path() / "a.vdb", bake(icosphere(2), 24), "ball");
