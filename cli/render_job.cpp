@@ -53,13 +53,14 @@ std::filesystem::path bake_folder(const RenderOptions& options) {
 sdf::BakeResult bake(const Program& program, const RenderOptions& options, const core::Scene& scene) {
     sdf::BakeResult result =
         sdf::bake_scene(scene, options.bake, bake_folder(options), make_progress(program), stop_flag());
+    if (stop_flag()()) throw core::Interrupted();  // The bake ends early and says nothing.
     for (const sdf::MeshBake& mesh : result.meshes) {
         if (mesh.error) {
             warn(program,
                  fmt::format("{}; it is missing from everything traced through fields", mesh.error->what()));
             continue;
         }
-        for (const std::string& warning : mesh.info().warnings) {
+        for (const std::string& warning : mesh.warnings) {
             warn(program, fmt::format("mesh '{}': {}", mesh.name, warning));
         }
     }
