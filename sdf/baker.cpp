@@ -38,6 +38,7 @@ std::string settings_hash(double wanted_voxel, const BakeSettings& settings) {
     hasher.add(settings.max_dimension);
     hasher.add(settings.max_field_bytes);
     hasher.add(settings.surface_class);
+    hasher.add(kHalfThicknessVoxels);
     return hasher.hex();
 }
 

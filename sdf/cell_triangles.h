@@ -16,7 +16,6 @@ struct TriangleHit {
     std::uint32_t index = kNoTriangle;  ///< Into the mesh's triangles.
     Triangle corners;                   ///< Local units.
     TrianglePoint point;
-    double t = 0.0;         ///< Ray parameter, of a met triangle only.
     double distance = 0.0;  ///< From the crossing, local units.
 
     explicit operator bool() const { return index != kNoTriangle; }
@@ -31,25 +30,10 @@ public:
     /// The triangle closest to a point; the lowest number of equally near ones.
     TriangleHit closest(const glm::dvec3& point) const;
 
-    /// The first triangle that the ray truly meets within [t_min, t_max], of those whose plane passes within
-    /// `reach` of `point`.
-    TriangleHit first_met(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
-                          const glm::dvec3& point, double reach) const;
-
 private:
     int count_ = 0;
     std::array<std::uint32_t, 8> indices_{};
     std::array<Triangle, 8> corners_;
 };
-
-/// Where a ray meets a triangle's plane, against the triangle's edges.
-struct PlanePassage {
-    glm::dvec3 point{0.0};
-    double t = 0.0;
-    /// Bit 0, 1, 2 where the point lies beyond the edge opposite the first, second, third corner. All three
-    /// for a ray in parallel to the plane.
-    std::uint8_t beyond = 0;
-};
-PlanePassage pass_plane(const Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction);
 
 }  // namespace sdf

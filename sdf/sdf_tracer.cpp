@@ -9,8 +9,8 @@
 
 #include "core/support/parallel.h"
 #include "core/trace/surface.h"
-#include "sdf/border_edges.h"
 #include "sdf/cell_triangles.h"
+#include "sdf/distance.h"
 #include "sdf/transform_scale.h"
 
 namespace sdf {
@@ -27,19 +27,13 @@ constexpr double kSurfaceClearanceVoxels = 0.05;
 /// whose diagonal is 1.74.
 constexpr double kFarthestTriangleVoxels = 2.0;
 
-/// A triangle of a thin wall may be thickened in one place and not in another. Beyond this distance a hit
-/// lies on the thickened shell: that of a flat sheet is found at 0.32 to 0.78 voxels, plain surfaces nearer
-/// than 0.2.
+/// Next to a thickened surface the shell covers plain ones as well. A crossing farther than this from its
+/// triangle lies on a shell: plain surfaces are nearer than 0.2 voxels.
 constexpr double kShellVoxels = 0.25;
 
-/// The shell's surface lies no farther than this from the plane of the triangle it stands for.
-constexpr double kShellReachVoxels = 0.9;
-
-/// No ray is taken to be within one shell for longer.
+/// How far beyond the place where a ray comes into a shell its triangles are looked for at once. Whatever
+/// lies farther is looked for where the ray leaves the shell.
 constexpr double kShellPassageVoxels = 8.0;
-
-/// Room between a ray that leaves a shell and the shell.
-constexpr double kShellClearanceVoxels = 0.05;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -55,12 +49,24 @@ double four_ulp(double magnitude) {
     return 4.0 * magnitude * static_cast<double>(std::numeric_limits<float>::epsilon());
 }
 
-/// Whether the closest point lies on a border edge that the ray passes beyond.
-bool touches_border(const TriangleHit& hit, std::uint8_t beyond, std::uint8_t borders) {
-    const glm::dvec2& b = hit.point.barycentrics;
-    const unsigned touched =
-        (1.0 - b.x - b.y <= 0.0 ? 1u : 0u) | (b.x <= 0.0 ? 2u : 0u) | (b.y <= 0.0 ? 4u : 0u);
-    return (touched & beyond & borders) != 0;
+/// All triangles of a mesh that a ray can meet, in local units.
+TriangleBvh triangle_tree(const core::Mesh& mesh) {
+    std::vector<Triangle> triangles(mesh.triangles.size());
+    std::vector<std::uint32_t> usable;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        const glm::uvec3& corners = mesh.triangles[i];
+        triangles[i] = {glm::dvec3(mesh.positions[corners.x]), glm::dvec3(mesh.positions[corners.y]),
+                        glm::dvec3(mesh.positions[corners.z])};
+        const double area = glm::length(triangles[i].scaled_normal());
+        if (area > 0.0 && std::isfinite(area)) usable.push_back(static_cast<std::uint32_t>(i));
+    }
+    return TriangleBvh(triangles, usable);
+}
+
+/// How far off an exact point of the mesh a ray must start not to meet the field that stands for it.
+double surface_offset_voxels(const BrickGrid& grid) {
+    if (grid.info().mesh_class == MeshClass::kSheet) return 0.0;
+    return std::min(grid.info().error_voxels.max, 1.0) + kSurfaceClearanceVoxels;
 }
 
 }  // namespace
@@ -73,9 +79,9 @@ struct SdfTracer::LocalRay {
     const core::Mesh& mesh;
     glm::dvec3 origin;     ///< Voxel coordinates.
     glm::dvec3 direction;  ///< Voxels a world unit.
-    /// From where on the ray may have come into a shell without meeting its surface: at first its start, for
-    /// it may start within one.
-    double unmet_since;
+    double t_max;          ///< The nearest hit of other instances, or the ray's own end.
+    double unmet_since;    ///< No visible triangle is met before; at first the ray's start.
+    bool is_inside;        ///< Whether the field is negative where the walk has come to.
 };
 
 /// The nearest visible crossing so far.
@@ -85,8 +91,8 @@ struct SdfTracer::Nearest {
     std::uint32_t triangle = core::kNoIndex;
     glm::dvec2 barycentrics{0.0};
     bool is_front = true;
-    bool is_shell = false;
-    Crossing crossing;
+    bool is_triangle = false;  ///< The ray meets the triangle itself, not the field that stands for it.
+    Crossing crossing;         ///< Where not is_triangle.
 
     bool found() const { return instance != core::kNoIndex; }
 };
@@ -102,11 +108,12 @@ struct SdfTracer::Work {
 SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids)
     : scene_(scene), grids_(std::move(grids)), has_alpha_(core::has_alpha(scene)) {
     assert(grids_.size() == scene.meshes.size());
-    borders_.resize(grids_.size());
+    triangles_.resize(grids_.size(), TriangleBvh({}, {}));
     core::parallel_for(grids_.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            if (!grids_[i] || grids_[i]->half_thickness_voxels() == 0.0) continue;
-            borders_[i] = find_border_edges({scene.meshes[i].positions, scene.meshes[i].triangles});
+            if (grids_[i] && grids_[i]->half_thickness_voxels() > 0.0) {
+                triangles_[i] = triangle_tree(scene.meshes[i]);
+            }
         }
     });
     std::vector<core::DoubleBounds> boxes(scene.instances.size());
@@ -118,15 +125,14 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         const double h = grid->voxel_size();
         PlacedGrid& placed = placed_[i];
         placed.grid = grid;
-        placed.borders = &borders_[instance.mesh];
+        placed.triangles = triangles_[instance.mesh].empty() ? nullptr : &triangles_[instance.mesh];
         placed.voxel_from_world_direction = glm::dmat3(instance.local_from_world) / h;
         placed.voxel_origin = (glm::dvec3(instance.local_from_world[3]) - grid->origin()) / h;
         placed.world_from_voxel_scale = largest_singular_value(glm::dmat3(instance.world_from_local)) * h;
-        const double representation = std::min(grid->info().error_voxels.max, 1.0);
-        placed.start_offset =
-            static_cast<float>(placed.world_from_voxel_scale *
-                               (grid->half_thickness_voxels() + representation + kShellClearanceVoxels));
         boxes[i] = core::transformed(grid->local_bounds(), instance.world_from_local);
+        const double reach = glm::length(glm::max(glm::abs(boxes[i].minimum), glm::abs(boxes[i].maximum)));
+        placed.start_offset = static_cast<float>(
+            surface_offset_voxels(*grid) * placed.world_from_voxel_scale + four_ulp(reach));
         // The corners are rounded; rays are clipped exactly later, in the grid's own space.
         const glm::dvec3 slack =
             1e-12 * (glm::abs(boxes[i].minimum) + glm::abs(boxes[i].maximum)) + 1e-6 * boxes[i].extent();
@@ -136,107 +142,72 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
     tree_ = InstanceTree(boxes);
 }
 
+bool SdfTracer::meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const {
+    const BrickGrid& grid = *ray.placed.grid;
+    const double h = grid.voxel_size();
+    const glm::dvec3 origin = grid.origin() + h * ray.origin;
+    const glm::dvec3 direction = h * ray.direction;
+    t_max = std::min(t_max, ray.t_max);
+    while (t_min <= t_max) {
+        const FirstHit met = ray.placed.triangles->first_hit(origin, direction, t_min, t_max);
+        if (!met) break;
+        const glm::uvec3& corner = ray.mesh.triangles[met.triangle];
+        const Triangle triangle{glm::dvec3(ray.mesh.positions[corner.x]),
+                                glm::dvec3(ray.mesh.positions[corner.y]),
+                                glm::dvec3(ray.mesh.positions[corner.z])};
+        found.barycentrics = closest_point(triangle, origin + met.t * direction).barycentrics;
+        if (!has_alpha_ || core::is_visible(scene_, ray.instance, met.triangle, glm::vec2(found.barycentrics),
+                                            ray.world.seed)) {
+            found.t = met.t;
+            found.instance = ray.instance;
+            found.triangle = met.triangle;
+            found.is_front = glm::dot(direction, triangle.scaled_normal()) < 0.0;
+            found.is_triangle = true;
+            return true;
+        }
+        t_min = std::nextafter(met.t, kNever);
+    }
+    ray.unmet_since = std::max(ray.unmet_since, t_max);
+    return false;
+}
+
 bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const {
     const BrickGrid& grid = *ray.placed.grid;
     const double h = grid.voxel_size();
+    ray.is_inside = crossing.enters_negative;
+    // The ray was inside a shell, or inside a solid that a shell runs into.
+    if (ray.placed.triangles && !crossing.enters_negative &&
+        meet_triangle(ray, ray.unmet_since, crossing.t, found)) {
+        return true;
+    }
     const glm::ivec3 cell = crossing.cell - crossing.cell / kBrickCells * kBrickCells;
     const CellTriangles triangles(ray.mesh, grid.brick_at(crossing.brick), cell);
     const glm::dvec3 point = grid.origin() + h * (glm::dvec3(crossing.cell) + crossing.point);
-    TriangleHit hit = triangles.closest(point);
+    const TriangleHit hit = triangles.closest(point);
     if (!hit) return false;
     const Feature feature = grid.feature(hit.index);
     const double farthest =
         kFarthestTriangleVoxels + (feature == Feature::kSurface ? 0.0 : kHalfThicknessVoxels);
     if (hit.distance > farthest * h) return false;
-    found.is_shell =
-        feature == Feature::kSheet || (feature == Feature::kThinWall && hit.distance > kShellVoxels * h);
-    if (found.is_shell && !resolve_shell(ray, crossing.t, point, triangles, hit)) return false;
-
-    found.triangle = hit.index;
-    found.barycentrics = hit.point.barycentrics;
-    if (has_alpha_ && !core::is_visible(scene_, ray.instance, found.triangle, glm::vec2(found.barycentrics),
+    if (feature != Feature::kSurface || (ray.placed.triangles && hit.distance > kShellVoxels * h)) {
+        if (!crossing.enters_negative) return false;
+        // The field of a plain surface next to the shell may lie behind its triangles.
+        const double speed = glm::length(ray.direction);
+        return meet_triangle(ray, std::max(ray.unmet_since, crossing.t - kFarthestTriangleVoxels / speed),
+                             crossing.t + kShellPassageVoxels / speed, found);
+    }
+    if (has_alpha_ && !core::is_visible(scene_, ray.instance, hit.index, glm::vec2(hit.point.barycentrics),
                                         ray.world.seed)) {
         return false;
     }
     found.t = crossing.t;
     found.instance = ray.instance;
+    found.triangle = hit.index;
+    found.barycentrics = hit.point.barycentrics;
     // Directions in voxels and in local units differ by h alone, which no sign depends on.
     found.is_front = glm::dot(ray.direction, hit.corners.scaled_normal()) < 0.0;
     found.crossing = crossing;
     return true;
-}
-
-/// Whether a crossing of a thickened shell is a hit of the surface within, and at which of its triangles.
-bool SdfTracer::resolve_shell(LocalRay& ray, double t, const glm::dvec3& point,
-                              const CellTriangles& triangles, TriangleHit& hit) const {
-    const BrickGrid& grid = *ray.placed.grid;
-    const double h = grid.voxel_size();
-    const glm::dvec3 origin = grid.origin() + h * ray.origin;
-    const glm::dvec3 direction = h * ray.direction;
-    const double reach = kShellReachVoxels * h;
-    const bool leaves = glm::dot(point - hit.point.position, ray.direction) > 0.0;
-    if (leaves) {
-        // Only what lies between here and the place where the ray came to be in the shell without having met
-        // anything: its start, or the rim.
-        const TriangleHit met = triangles.first_met(origin, direction, ray.unmet_since, t, point, reach);
-        ray.unmet_since = kNever;
-        if (met) hit = met;
-        return static_cast<bool>(met);
-    }
-    const double t_far = t + kShellPassageVoxels / glm::length(ray.direction);
-    const TriangleHit met = triangles.first_met(origin, direction, t, t_far, point, reach);
-    if (met) {
-        // The point that the ray truly meets: alpha and uv as they are on triangles. If it turns out
-        // transparent, another triangle within the same shell may still be met.
-        hit = met;
-        ray.unmet_since = std::nextafter(met.t, kNever);
-        return true;
-    }
-    if (passes_rim(ray, hit, origin, direction, t_far)) {
-        ray.unmet_since = t;
-        return false;
-    }
-    return true;
-}
-
-/// Whether a ray that comes into a shell near the triangle of `hit`, and meets none there, only passes the
-/// rim beyond the sheet's border. Follows the ray to where it comes through the sheet's plane, cell by cell,
-/// since a slanted ray does so some way off. If it meets a triangle there, `hit` becomes that.
-bool SdfTracer::passes_rim(LocalRay& ray, TriangleHit& hit, const glm::dvec3& origin,
-                           const glm::dvec3& direction, double t_far) const {
-    constexpr int kMostSteps = 4;
-    const BrickGrid& grid = *ray.placed.grid;
-    const double reach = kShellReachVoxels * grid.voxel_size();
-    ray.unmet_since = kNever;
-    TriangleHit near = hit;
-    for (int step = 0; step < kMostSteps; ++step) {
-        const PlanePassage passage = pass_plane(near.corners, origin, direction);
-        const std::uint8_t borders = (*ray.placed.borders)[near.index];
-        const bool beyond_border_alone = passage.beyond != 0 && (passage.beyond & ~borders) == 0;
-        // Parallel to the sheet: what is seen is its edge, which has no extent.
-        if (passage.beyond == 7) return borders != 0;
-        if (!(passage.t <= t_far)) return beyond_border_alone;
-        const glm::dvec3 voxel = (passage.point - grid.origin()) / grid.voxel_size();
-        const glm::ivec3 cell(glm::floor(voxel));
-        const Brick* brick = grid.brick_or_null(cell);
-        // Nothing is near the place where the ray comes through.
-        if (!brick) return (passage.beyond & borders) != 0;
-        const CellTriangles there(ray.mesh, *brick, cell - cell / kBrickCells * kBrickCells);
-        const TriangleHit met =
-            there.first_met(origin, direction, ray.world.t_min, t_far, passage.point, reach);
-        if (met) {
-            hit = met;
-            ray.unmet_since = std::nextafter(met.t, kNever);
-            return false;
-        }
-        const TriangleHit next = there.closest(passage.point);
-        if (!next) return (passage.beyond & borders) != 0;
-        if (next.index == near.index) {
-            return beyond_border_alone || touches_border(next, passage.beyond, borders);
-        }
-        near = next;
-    }
-    return false;
 }
 
 void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest,
@@ -248,30 +219,44 @@ void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nea
                    scene_.meshes[scene_.instances[instance].mesh],
                    placed.voxel_from_world_direction * glm::dvec3(ray.origin) + placed.voxel_origin,
                    placed.voxel_from_world_direction * glm::dvec3(ray.direction),
-                   ray.t_min};
+                   nearest.t,
+                   ray.t_min,
+                   false};
     double t_min = ray.t_min, t_max = nearest.t;
     if (!clip_to_box(placed.grid->traced_voxels(), local.origin, finite_inverse(local.direction), t_min,
                      t_max)) {
         return;
     }
+    if (placed.triangles) {
+        local.is_inside =
+            distance_at(*placed.grid, local.origin + t_min * local.direction).value_or(1.0) < 0.0;
+    }
     RayMarch march(*placed.grid, local.origin, local.direction, t_min, t_max);
     Crossing crossing;
-    while (march.next(crossing)) {
-        Nearest found;
-        if (resolve(local, crossing, found)) {
-            // At equal distance the lowest instance wins, whatever the order of the walk.
-            if (found.t < nearest.t || !nearest.found() || instance < nearest.instance) nearest = found;
-            break;
-        }
+    Nearest found;
+    while (!found.found() && march.next(crossing)) resolve(local, crossing, found);
+    // The ray ends within a shell.
+    if (placed.triangles && !found.found() && local.is_inside) {
+        meet_triangle(local, local.unmet_since, t_max, found);
+    }
+    // At equal distance the lowest instance wins, whatever the order of the walk.
+    if (found.found() && (found.t < nearest.t || !nearest.found() || instance < nearest.instance)) {
+        nearest = found;
     }
     work.ray_steps += march.steps();
     work.ray_exhausted = work.ray_exhausted || march.is_exhausted();
 }
 
-core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const {
+glm::dvec3 SdfTracer::triangle_side(const core::Ray& ray, const Nearest& nearest) const {
+    const core::Instance& instance = scene_.instances[nearest.instance];
+    const glm::dvec3 normal = glm::normalize(glm::transpose(glm::dmat3(instance.local_from_world)) *
+                                             triangle_normal(scene_.meshes[instance.mesh], nearest.triangle));
+    return glm::dot(normal, glm::dvec3(ray.direction)) > 0.0 ? -normal : normal;
+}
+
+glm::dvec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) const {
     const PlacedGrid& placed = placed_[nearest.instance];
-    const BrickGrid& grid = *placed.grid;
-    glm::dvec3 gradient = smooth_gradient(grid, nearest.crossing.cell, nearest.crossing.point);
+    glm::dvec3 gradient = smooth_gradient(*placed.grid, nearest.crossing.cell, nearest.crossing.point);
     if (!(glm::length(gradient) >= 1e-6)) {
         const core::Mesh& mesh = scene_.meshes[scene_.instances[nearest.instance].mesh];
         gradient = triangle_normal(mesh, nearest.triangle);
@@ -289,6 +274,13 @@ core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const 
     // crossing says; it is tilted until it faces the ray.
     constexpr double kFacing = 1e-6;
     if (cosine > -kFacing) normal = glm::normalize(normal - (cosine + 2.0 * kFacing) * direction);
+    return normal;
+}
+
+core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const {
+    const PlacedGrid& placed = placed_[nearest.instance];
+    const glm::dvec3 direction(ray.direction);
+    const glm::dvec3 normal = nearest.is_triangle ? triangle_side(ray, nearest) : field_side(ray, nearest);
 
     core::Hit hit;
     hit.status = core::HitStatus::kHit;
@@ -301,8 +293,7 @@ core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const 
     const glm::dvec3 origin(ray.origin);
     const glm::dvec3 position = origin + nearest.t * direction;
     const double magnitude = std::max({glm::length(position), glm::length(origin), nearest.t});
-    double clearance_voxels = kSurfaceClearanceVoxels;
-    if (nearest.is_shell) clearance_voxels = grid.half_thickness_voxels() + kShellClearanceVoxels;
+    const double clearance_voxels = nearest.is_triangle ? 0.0 : kSurfaceClearanceVoxels;
     hit.offset =
         static_cast<float>(std::max(clearance_voxels * placed.world_from_voxel_scale, four_ulp(magnitude)));
     return hit;
@@ -374,7 +365,7 @@ std::size_t SdfTracer::bytes() const {
     for (const auto& grid : grids_) {
         if (grid && counted.insert(grid.get()).second) total += grid->bytes();
     }
-    for (const auto& borders : borders_) total += borders.capacity();
+    for (const TriangleBvh& triangles : triangles_) total += triangles.bytes();
     return total;
 }
 

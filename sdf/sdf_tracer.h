@@ -17,11 +17,15 @@
 #include "sdf/cell_triangles.h"
 #include "sdf/instance_tree.h"
 #include "sdf/sphere_trace.h"
+#include "sdf/triangle_bvh.h"
 
 namespace sdf {
 
-/// Finds hits by walking the fields of all instances front to back. Hits lie on the exact surface of the
-/// trilinear field; triangle and barycentrics are the closest point of the closest stored triangle.
+/// Finds hits by walking the fields of all instances front to back. Hits on solids lie on the exact surface
+/// of the trilinear field; triangle and barycentrics are the closest point of the closest stored triangle.
+/// Sheets and walls too thin for the lattice are held by a shell of half a voxel on either side, so that no
+/// ray slips between samples; where a ray meets a shell, the stored triangles within decide whether and where
+/// it hits, so that such surfaces are as thin and as wide as they are.
 class SdfTracer : public core::Tracer {
 public:
     /// Work done since construction, over all threads.
@@ -39,7 +43,7 @@ public:
     void trace_closest(const core::RayStream& rays, core::HitStream& hits) const override;
     void trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const override;
 
-    /// The largest distance measured at the bake between mesh and field surface, half-thickness included.
+    /// The largest distance measured at the bake between mesh and field surface; rounding alone for sheets.
     float start_offset(std::uint32_t instance) const override;
 
     Statistics statistics() const;
@@ -51,7 +55,7 @@ private:
     /// One instance, ready for rays.
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
-        const std::vector<std::uint8_t>* borders = nullptr;  ///< Of the mesh, by triangle.
+        const TriangleBvh* triangles = nullptr;  ///< Of the mesh, local units; null if nothing is thickened.
         glm::dmat3 voxel_from_world_direction{1.0};
         glm::dvec3 voxel_origin{0.0};         ///< Voxel coordinates of the world's origin.
         double world_from_voxel_scale = 1.0;  ///< Largest stretch of one voxel, in world units.
@@ -67,16 +71,17 @@ private:
     void trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest, Work& work) const;
     /// Finds the triangle of a crossing; false where there is no visible surface.
     bool resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const;
-    bool resolve_shell(LocalRay& ray, double t, const glm::dvec3& point, const CellTriangles& triangles,
-                       TriangleHit& hit) const;
-    bool passes_rim(LocalRay& ray, TriangleHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
-                    double t_far) const;
+    /// Finds the first visible triangle that the ray truly meets in [t_min, t_max].
+    bool meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const;
+    /// The normal that faces the ray: of the triangle itself, or of the field.
+    glm::dvec3 triangle_side(const core::Ray& ray, const Nearest& nearest) const;
+    glm::dvec3 field_side(const core::Ray& ray, const Nearest& nearest) const;
     core::Hit finish(const core::Ray& ray, const Nearest& nearest) const;
     void count(const Work& work) const;
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;
-    std::vector<std::vector<std::uint8_t>> borders_;  ///< By mesh; empty where nothing is thickened.
+    std::vector<TriangleBvh> triangles_;  ///< By mesh; empty where nothing is thickened.
     std::vector<PlacedGrid> placed_;
     InstanceTree tree_;
     bool has_alpha_ = false;

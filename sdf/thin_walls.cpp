@@ -82,7 +82,7 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
                 // A voxel below the surface and still a voxel from any: thick, without asking further.
                 double depth = 0.0;
                 if (field.interpolate(center + inward, depth) && depth < -kClearlyInside) continue;
-                piece.thickness = solids.nearest_crossing(center, inward, 1e-9, kSafeThickness);
+                piece.thickness = solids.first_hit(center, inward, 1e-9, kSafeThickness).t;
                 if (!(piece.thickness < kSafeThickness)) continue;
                 if (!field.interpolate(center + 0.5 * piece.thickness * inward, depth)) continue;
                 if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness)) {

@@ -55,16 +55,17 @@ TrianglePoint closest_point(const Triangle& triangle, const glm::dvec3& point) {
 double intersect(const Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction) {
     // Moller and Trumbore, "Fast, Minimum Storage Ray-Triangle Intersection", JGT 1997.
     constexpr double kMiss = std::numeric_limits<double>::quiet_NaN();
+    constexpr double kEdgeSlack = 1e-12;
     const glm::dvec3 edge1 = triangle.b - triangle.a, edge2 = triangle.c - triangle.a;
     const glm::dvec3 p = glm::cross(direction, edge2);
     const double determinant = glm::dot(edge1, p);
     if (determinant == 0.0) return kMiss;
     const glm::dvec3 s = origin - triangle.a;
     const double u = glm::dot(s, p) / determinant;
-    if (!(u >= 0.0 && u <= 1.0)) return kMiss;
+    if (!(u >= -kEdgeSlack && u <= 1.0 + kEdgeSlack)) return kMiss;
     const glm::dvec3 q = glm::cross(s, edge1);
     const double v = glm::dot(direction, q) / determinant;
-    if (!(v >= 0.0 && u + v <= 1.0)) return kMiss;
+    if (!(v >= -kEdgeSlack && u + v <= 1.0 + kEdgeSlack)) return kMiss;
     return glm::dot(edge2, q) / determinant;
 }
 
@@ -144,12 +145,11 @@ ClosestTriangle TriangleBvh::closest(const glm::dvec3& point, ClosestTriangle be
     return best;
 }
 
-double TriangleBvh::nearest_crossing(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
-                                     double t_max) const {
-    constexpr double kNothing = std::numeric_limits<double>::infinity();
-    if (nodes_.empty()) return kNothing;
+FirstHit TriangleBvh::first_hit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                double t_max) const {
+    FirstHit best;
+    if (nodes_.empty()) return best;
     double nearest = t_max;
-    bool found = false;
     std::uint32_t stack[kMaxDepth];
     int depth = 0;
     stack[depth++] = 0;
@@ -169,7 +169,7 @@ double TriangleBvh::nearest_crossing(const glm::dvec3& origin, const glm::dvec3&
             far = std::min(far, std::max(a, b));
         }
         // Rounding of the slab test must not lose a triangle that lies in the box's face.
-        if (missed || near > far * (1.0 + 1e-12) + 1e-12) continue;
+        if (missed || near > far + 1e-12 * (std::abs(far) + 1.0)) continue;
         if (!node.is_leaf()) {
             stack[depth++] = node.second;
             stack[depth++] = index + 1;
@@ -177,13 +177,18 @@ double TriangleBvh::nearest_crossing(const glm::dvec3& origin, const glm::dvec3&
         }
         for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
             const double t = intersect(triangles_[i], origin, direction);
-            if (t > t_min && t < nearest) {
-                nearest = t;
-                found = true;
-            }
+            if (!(t >= t_min && t <= nearest)) continue;
+            if (best && t == nearest && order_[i] > best.triangle) continue;
+            nearest = t;
+            best = {t, order_[i]};
         }
     }
-    return found ? nearest : kNothing;
+    return best;
+}
+
+std::size_t TriangleBvh::bytes() const {
+    return nodes_.capacity() * sizeof(Node) + order_.capacity() * sizeof(std::uint32_t) +
+           triangles_.capacity() * sizeof(Triangle);
 }
 
 }  // namespace sdf

@@ -1,6 +1,7 @@
 // sdf/triangle_bvh.h: a bounding volume hierarchy over triangles, in double, for closest points and rays.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
@@ -29,7 +30,8 @@ struct TrianglePoint {
 /// 5.1.5).
 TrianglePoint closest_point(const Triangle& triangle, const glm::dvec3& point);
 
-/// Ray parameter where the line origin + t direction meets the triangle, or NaN where it does not.
+/// Ray parameter where the line origin + t direction meets the triangle, or NaN where it does not. Triangles
+/// reach 1e-12 of their size beyond their edges, so that rounding opens no gap between neighbours.
 double intersect(const Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction);
 
 inline constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
@@ -38,6 +40,14 @@ inline constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>:
 struct ClosestTriangle {
     double distance_squared = std::numeric_limits<double>::infinity();
     std::uint32_t triangle = kNoTriangle;
+};
+
+/// The first triangle along a ray.
+struct FirstHit {
+    double t = std::numeric_limits<double>::infinity();
+    std::uint32_t triangle = kNoTriangle;
+
+    explicit operator bool() const { return triangle != kNoTriangle; }
 };
 
 /// The tree. Median splits, so its shape depends on the triangles alone.
@@ -49,9 +59,9 @@ public:
     /// The closest triangle, or `seed` where nothing is nearer (at equal distance the lower index wins).
     ClosestTriangle closest(const glm::dvec3& point, ClosestTriangle seed = {}) const;
 
-    /// The nearest t in (t_min, t_max) along the ray at which a triangle is met, or infinity.
-    double nearest_crossing(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
-                            double t_max) const;
+    /// The first triangle that the ray meets in [t_min, t_max]; at equal t the lower index wins.
+    FirstHit first_hit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                       double t_max) const;
 
     bool empty() const { return nodes_.empty(); }
 
@@ -64,6 +74,7 @@ public:
         bool is_leaf() const { return second == 0; }
     };
     const std::vector<Node>& nodes() const { return nodes_; }
+    std::size_t bytes() const;
     /// Triangles in leaf order.
     const std::vector<Triangle>& triangles() const { return triangles_; }
 

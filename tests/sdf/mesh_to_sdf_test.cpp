@@ -171,11 +171,11 @@ TEST(MeshToSdf, SheetsAreDistancesLessTheHalfThickness) {
     const core::Mesh mesh = quad();
     const sdf::SampledField field = bake(mesh, 16);
     const double h = field.info.voxel_size;
-    EXPECT_NEAR(field.info.half_thickness, 0.55 * h, 1e-12);
+    EXPECT_NEAR(field.info.half_thickness, 0.9 * h, 1e-12);
     EXPECT_FALSE(field.info.clean_level_set);
     const std::vector<sdf::Triangle> triangles = triangles_of(mesh);
     for_each_sample(field, [&](const glm::dvec3& position, float value, std::int32_t) {
-        const double expected = std::min(brute_force_distance(triangles, position) - 0.55 * h, 4.0 * h);
+        const double expected = std::min(brute_force_distance(triangles, position) - 0.9 * h, 4.0 * h);
         ASSERT_NEAR(value, expected, 1e-6 * h);
     });
     EXPECT_EQ(field.features, std::vector<sdf::Feature>(mesh.triangles.size(), sdf::Feature::kSheet));
