@@ -9,7 +9,13 @@
 #include <cassert>
 
 #if defined(__SANITIZE_THREAD__)
-#include <sanitizer/tsan_interface.h>
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
 #endif
 
 namespace core {
@@ -18,49 +24,51 @@ namespace {
 
 constexpr unsigned int kFlushToZeroAndDenormalsAreZero = 0x8040;
 
-/// ThreadSanitizer cannot see how oneTBB, which is not instrumented, orders the start and the end of a loop.
-/// This tells it; elsewhere it is nothing.
-class LoopOrder {
-public:
-#if defined(__SANITIZE_THREAD__)
-    LoopOrder() {
-        __tsan_release(&start_);
-    }
-    ~LoopOrder() {
-        __tsan_acquire(&end_);
-    }
-    void enter() {
-        __tsan_acquire(&start_);
-    }
-    void leave() {
-        __tsan_release(&end_);
-    }
-
-private:
-    char start_ = 0;
-    char end_ = 0;
-#else
-    void enter() {}
-    void leave() {}
-#endif
-};
-
 }  // namespace
+
+#if defined(__SANITIZE_THREAD__)
+
+// oneTBB is not instrumented, so that ThreadSanitizer cannot see how it orders a loop's start and end. Its
+// builds run loops on threads that it can follow; a loop within a loop runs on the thread that meets it.
+void parallel_for(std::size_t count, std::size_t grain,
+                  const std::function<void(std::size_t, std::size_t)>& body) {
+    assert(grain > 0);
+    static thread_local bool is_inside = false;
+    std::atomic<std::size_t> next{0};
+    std::mutex mutex;
+    std::exception_ptr failure;
+    const auto work = [&] {
+        const bool was_inside = std::exchange(is_inside, true);
+        try {
+            for (std::size_t begin; (begin = next.fetch_add(grain)) < count;) {
+                body(begin, std::min(count, begin + grain));
+            }
+        } catch (...) {
+            const std::lock_guard lock(mutex);
+            if (!failure) failure = std::current_exception();
+        }
+        is_inside = was_inside;
+    };
+    std::vector<std::thread> others(is_inside ? 0 : static_cast<std::size_t>(thread_limit() - 1));
+    for (std::thread& other : others) other = std::thread(work);
+    work();
+    for (std::thread& other : others) other.join();
+    if (failure) std::rethrow_exception(failure);
+}
+
+#else
 
 void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t, std::size_t)>& body) {
     assert(grain > 0);
     if (count == 0) return;
-    LoopOrder order;
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, count, grain),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-            order.enter();
-            body(range.begin(), range.end());
-            order.leave();
-        },
+        [&](const tbb::blocked_range<std::size_t>& range) { body(range.begin(), range.end()); },
         tbb::simple_partitioner());
 }
+
+#endif
 
 void with_thread_limit(int thread_count, const std::function<void()>& work) {
     if (thread_count <= 0) {
