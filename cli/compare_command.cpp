@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,46 +15,82 @@
 
 #include "cli/options.h"
 #include "cli/picture_file.h"
+#include "core/image/error_estimate.h"
+#include "core/image/flip.h"
 #include "core/image/metrics.h"
+#include "core/image/png.h"
+#include "core/image/ssim.h"
 #include "core/support/error.h"
 
 namespace cli {
 
 namespace {
 
-constexpr int kExitThresholdFailed = 2;
+constexpr int kExitWarned = 1, kExitThresholdFailed = 2;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Everything that is measured of two pictures. What is not defined is NaN.
+struct Comparison {
+    core::ImageMetrics metrics;
+    core::FlipResult flip;
+    double flip_ldr = kNaN;  ///< Only where all values lie in [0, 1].
+    double ssim = kNaN;
+    core::ErrorInterval corrected{kNaN, kNaN, kNaN};  ///< Only where the reference brings its variance.
+    double reference_noise = kNaN;                    ///< relMSE that the reference's variance makes.
+    bool black_reference = false;
+};
+
+/// When a number is beyond its threshold.
+enum class Limit {
+    kSize,      ///< Where its absolute value is larger.
+    kUpperEnd,  ///< Where the upper end of its interval is larger.
+    kSmallest,  ///< Where it is smaller.
+};
 
 /// One number of the comparison: where it stands in the JSON, how it is shown, and the flag that limits it.
 struct Row {
     const char* key;   ///< Of the JSON, `percentiles` apart.
-    const char* flag;  ///< Its threshold: the run fails where the absolute value is larger.
+    const char* flag;  ///< Its threshold.
     const char* label;
     const char* definition;
-    double (*value)(const core::ImageMetrics&);
+    double (*value)(const Comparison&);
+    Limit limit = Limit::kSize;
+    const char* undefined = nullptr;  ///< Why there may be none, in finite pictures.
 };
 
 const Row kRows[] = {
-    {"mse", "--fail-mse", "MSE", "mean (I - R)^2", [](const core::ImageMetrics& m) { return m.mse; }},
+    {"mse", "--fail-mse", "MSE", "mean (I - R)^2", [](const Comparison& c) { return c.metrics.mse; }},
     {"rel_mse", "--fail-rel-mse", "relMSE", "mean (I - R)^2 / (R^2 + 0.01)",
-     [](const core::ImageMetrics& m) { return m.rel_mse; }},
+     [](const Comparison& c) { return c.metrics.rel_mse; }},
     {"rel_mse_trimmed", "--fail-rel-mse-trimmed", "relMSE, trimmed", "without the worst 0.1 % of the pixels",
-     [](const core::ImageMetrics& m) { return m.rel_mse_trimmed; }},
+     [](const Comparison& c) { return c.metrics.rel_mse_trimmed; }},
     {"mrse", "--fail-mrse", "MRSE", "mean (I - R)^2 / (R + 0.01)^2, as pbrt",
-     [](const core::ImageMetrics& m) { return m.mrse; }},
+     [](const Comparison& c) { return c.metrics.mrse; }},
     {"mape", "--fail-mape", "MAPE", "mean |I - R| / (R + 0.01)",
-     [](const core::ImageMetrics& m) { return m.mape; }},
+     [](const Comparison& c) { return c.metrics.mape; }},
     {"smape", "--fail-smape", "SMAPE", "mean |I - R| / (|I| + |R| + 0.01)",
-     [](const core::ImageMetrics& m) { return m.smape; }},
+     [](const Comparison& c) { return c.metrics.smape; }},
     {"50", "--fail-p50", "relative error P50", "of |Y_I - Y_R| / (Y_R + 0.01) over the pixels",
-     [](const core::ImageMetrics& m) { return m.p50; }},
-    {"95", "--fail-p95", "relative error P95", "", [](const core::ImageMetrics& m) { return m.p95; }},
-    {"99", "--fail-p99", "relative error P99", "", [](const core::ImageMetrics& m) { return m.p99; }},
-    {"99.9", "--fail-p99.9", "relative error P99.9", "", [](const core::ImageMetrics& m) { return m.p99_9; }},
-    {"max", "--fail-max", "relative error, max", "", [](const core::ImageMetrics& m) { return m.max; }},
+     [](const Comparison& c) { return c.metrics.p50; }},
+    {"95", "--fail-p95", "relative error P95", "", [](const Comparison& c) { return c.metrics.p95; }},
+    {"99", "--fail-p99", "relative error P99", "", [](const Comparison& c) { return c.metrics.p99; }},
+    {"99.9", "--fail-p99.9", "relative error P99.9", "", [](const Comparison& c) { return c.metrics.p99_9; }},
+    {"max", "--fail-max", "relative error, max", "", [](const Comparison& c) { return c.metrics.max; }},
     {"energy_bias", "--fail-energy-bias", "energy bias, %", "100 (sum Y_I / sum Y_R - 1)",
-     [](const core::ImageMetrics& m) { return m.energy_bias_percent; }},
+     [](const Comparison& c) { return c.metrics.energy_bias_percent; }, Limit::kSize,
+     "the reference is black"},
     {"leak", "--fail-leak", "leak", "sum max(Y_I - Y_R, 0) where R is dark / sum Y_R",
-     [](const core::ImageMetrics& m) { return m.leak.energy_fraction; }},
+     [](const Comparison& c) { return c.metrics.leak.energy_fraction; }, Limit::kSize,
+     "the reference is black"},
+    {"flip", "--fail-flip", "FLIP", "mean HDR FLIP, ACES, 67 pixels a degree",
+     [](const Comparison& c) { return c.flip.mean; }},
+    {"flip_ldr", "--fail-flip-ldr", "FLIP, LDR", "mean LDR FLIP of linear values in [0, 1]",
+     [](const Comparison& c) { return c.flip_ldr; }, Limit::kSize, "a value lies outside [0, 1]"},
+    {"ssim", "--fail-ssim", "SSIM", "mean, 11 x 11, sigma 1.5; R's automatic exposure, ACES, sRGB luma",
+     [](const Comparison& c) { return c.ssim; }, Limit::kSmallest},
+    {"rel_mse_corrected", "--fail-rel-mse-corrected", "relMSE, corrected",
+     "without the reference's own noise", [](const Comparison& c) { return c.corrected.value; },
+     Limit::kUpperEnd, "the reference has no Variance.R, .G, .B"},
 };
 constexpr std::size_t kFirstPercentile = 6, kLastPercentile = 9;
 
@@ -61,6 +98,7 @@ struct CompareOptions {
     std::vector<std::string> inputs;
     std::string layer;
     std::string folder;
+    std::string flip_map;
     std::optional<double> limits[std::size(kRows)];
 };
 
@@ -88,29 +126,79 @@ void check_inputs(const CompareOptions& options) {
         throw core::InputError(core::ErrorKind::kUsage,
                                "compare: two pictures are needed, the one under test and its reference");
     }
+    if (!options.flip_map.empty() && std::filesystem::path(options.flip_map).extension() != ".png") {
+        throw core::InputError(core::ErrorKind::kUsage,
+                               fmt::format("--flip-map '{}': only .png can be written", options.flip_map));
+    }
 }
 
-nlohmann::json report_of(const core::ImageMetrics& metrics) {
+Comparison measure(const CompareOptions& options, const PictureLayer& test, const PictureLayer& reference) {
+    const int width = test.image.width(), height = test.image.height();
+    Comparison comparison;
+    comparison.metrics = core::compare_images(test.radiance, reference.radiance);
+    comparison.flip = core::flip_hdr(test.radiance, reference.radiance, width, height);
+    if (core::is_low_dynamic_range(test.radiance) && core::is_low_dynamic_range(reference.radiance)) {
+        comparison.flip_ldr = core::flip_ldr(test.radiance, reference.radiance, width, height).mean;
+    }
+    comparison.ssim = core::ssim(test.radiance, reference.radiance, width, height);
+    // The variance belongs to the beauty.
+    if (options.layer.empty() && reference.image.color("Variance")) {
+        comparison.corrected = core::corrected_rel_mse(test.image, reference.image);
+        comparison.reference_noise = core::noise_rel_mse(reference.image);
+    }
+    comparison.black_reference =
+        std::none_of(reference.radiance.begin(), reference.radiance.end(),
+                     [](const glm::vec3& color) { return core::luminance(color) > 0.0f; });
+    return comparison;
+}
+
+nlohmann::json report_of(const Comparison& comparison) {
     nlohmann::json report = {{"schema", 1}, {"percentiles", nlohmann::json::object()}};
     for (std::size_t i = 0; i < std::size(kRows); ++i) {
         const bool percentile = i >= kFirstPercentile && i <= kLastPercentile;
-        (percentile ? report["percentiles"] : report)[kRows[i].key] = kRows[i].value(metrics);
+        (percentile ? report["percentiles"] : report)[kRows[i].key] = kRows[i].value(comparison);
     }
-    report["leak_details"] = {{"mean", metrics.leak.mean},
-                              {"p99.9", metrics.leak.p99_9},
-                              {"dark_pixels", metrics.leak.dark_pixels},
-                              {"lit_bias", metrics.leak.lit_bias_percent},
-                              {"counts", metrics.leak.counts}};
-    report["nonfinite_pixels"] = metrics.nonfinite_pixels;
+    const core::LeakMetric& leak = comparison.metrics.leak;
+    report["leak_details"] = {{"mean", leak.mean},
+                              {"p99.9", leak.p99_9},
+                              {"dark_pixels", leak.dark_pixels},
+                              {"lit_bias", leak.lit_bias_percent},
+                              {"counts", leak.counts}};
+    const core::FlipResult& flip = comparison.flip;
+    report["flip_details"] = {{"weighted_median", flip.weighted_median},
+                              {"first_quartile", flip.first_quartile},
+                              {"third_quartile", flip.third_quartile},
+                              {"min", flip.min},
+                              {"max", flip.max},
+                              {"exposures", flip.exposures}};
+    report["rel_mse_corrected_details"] = {{"low", comparison.corrected.low},
+                                           {"high", comparison.corrected.high},
+                                           {"reference_noise", comparison.reference_noise}};
+    report["nonfinite_pixels"] = comparison.metrics.nonfinite_pixels;
     return report;
 }
 
-void print_table(const core::ImageMetrics& metrics) {
+void print_table(const Comparison& comparison) {
+    const core::ImageMetrics& metrics = comparison.metrics;
     for (const Row& row : kRows) {
+        const double value = row.value(comparison);
+        const bool undefined = std::isnan(value) && metrics.nonfinite_pixels == 0 && row.undefined;
         const std::string line =
-            fmt::format("{:<21} {:>12.6g}   {}", row.label, row.value(metrics), row.definition);
+            undefined ? fmt::format("{:<21} {:>12}   not defined: {}", row.label, "-", row.undefined)
+                      : fmt::format("{:<21} {:>12.6g}   {}", row.label, value, row.definition);
         fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
     }
+    if (!std::isnan(comparison.corrected.value)) {
+        fmt::print("{:<21} {:>12}   {:.6g} to {:.6g}; the reference's noise makes {:.6g}\n",
+                   "  95 % interval", "", comparison.corrected.low, comparison.corrected.high,
+                   comparison.reference_noise);
+    }
+    const core::FlipResult& flip = comparison.flip;
+    fmt::print(
+        "{:<21} {:>12.6g}   weighted: half of the error lies in pixels up to this; quartiles {:.6g} and "
+        "{:.6g}; "
+        "from {:.6g} to {:.6g}\n",
+        "FLIP, median", flip.weighted_median, flip.first_quartile, flip.third_quartile, flip.min, flip.max);
     const core::LeakMetric& leak = metrics.leak;
     fmt::print("{:<21} {:>12.6g}   over {} dark pixels; P99.9 {:.6g}; {}\n", "leak, mean", leak.mean,
                leak.dark_pixels, leak.p99_9,
@@ -121,8 +209,51 @@ void print_table(const core::ImageMetrics& metrics) {
                metrics.nonfinite_pixels, metrics.nonfinite_test_pixels, metrics.nonfinite_reference_pixels);
 }
 
+/// Why one number is beyond its threshold, or nothing.
+std::optional<std::string> failure_of(const Row& row, double threshold, const Comparison& comparison) {
+    const double value = row.value(comparison);
+    if (std::isnan(value) && row.undefined) {
+        return fmt::format("{} is not defined, since {}; {} cannot hold", row.label, row.undefined, row.flag);
+    }
+    // Written so that a value that is not a number fails.
+    if (row.limit == Limit::kSmallest) {
+        if (value >= threshold) return std::nullopt;
+        return fmt::format("{} is {:.6g}, {} wants {:.6g}", row.label, value, row.flag, threshold);
+    }
+    if (row.limit == Limit::kUpperEnd) {
+        if (comparison.corrected.high <= threshold) return std::nullopt;
+        return fmt::format("{} may be {:.6g}, {} allows {:.6g}", row.label, comparison.corrected.high,
+                           row.flag, threshold);
+    }
+    if (!(std::abs(value) <= threshold)) {
+        return fmt::format("{} is {:.6g}, {} allows {:.6g}", row.label, value, row.flag, threshold);
+    }
+    const core::LeakMetric& leak = comparison.metrics.leak;
+    if (std::string_view(row.key) == "leak" && !leak.counts) {
+        return fmt::format("leak does not count, since the lit side is off by {:.3g} %",
+                           leak.lit_bias_percent);
+    }
+    return std::nullopt;
+}
+
+/// Of a threshold's flag.
+std::string help_of(const Row& row) {
+    const std::string definition = *row.definition ? fmt::format(" = {}", row.definition) : "";
+    switch (row.limit) {
+        case Limit::kSmallest:
+            return fmt::format("Fail where {} is smaller{}", row.label, definition);
+        case Limit::kUpperEnd:
+            return fmt::format("Fail where the upper end of the 95 % interval of {} is larger{}", row.label,
+                               definition);
+        case Limit::kSize:
+            break;
+    }
+    return fmt::format("Fail where |{}| is larger{}", row.label, definition);
+}
+
 /// What makes the comparison fail, one line each.
-std::vector<std::string> failures_of(const CompareOptions& options, const core::ImageMetrics& metrics) {
+std::vector<std::string> failures_of(const CompareOptions& options, const Comparison& comparison) {
+    const core::ImageMetrics& metrics = comparison.metrics;
     std::vector<std::string> failures;
     if (metrics.nonfinite_pixels > 0) {
         failures.push_back(fmt::format("{} pixels are not finite ({} in the test, {} in the reference)",
@@ -132,17 +263,43 @@ std::vector<std::string> failures_of(const CompareOptions& options, const core::
     }
     for (std::size_t i = 0; i < std::size(kRows); ++i) {
         if (!options.limits[i]) continue;
-        const double value = kRows[i].value(metrics);
-        // Written so that a value that is not a number fails.
-        if (!(std::abs(value) <= *options.limits[i])) {
-            failures.push_back(fmt::format("{} is {:.6g}, {} allows {:.6g}", kRows[i].label, value,
-                                           kRows[i].flag, *options.limits[i]));
-        } else if (std::string_view(kRows[i].key) == "leak" && !metrics.leak.counts) {
-            failures.push_back(fmt::format("leak does not count, since the lit side is off by {:.3g} %",
-                                           metrics.leak.lit_bias_percent));
+        if (auto failure = failure_of(kRows[i], *options.limits[i], comparison)) {
+            failures.push_back(std::move(*failure));
         }
     }
     return failures;
+}
+
+/// What makes the numbers say less than they seem to, one line each.
+std::vector<std::string> warnings_of(const CompareOptions& options, const Comparison& comparison) {
+    std::vector<std::string> warnings;
+    if (comparison.metrics.nonfinite_pixels > 0) return warnings;  // That is a failure.
+    if (comparison.black_reference) {
+        warnings.emplace_back(
+            "the reference is black: nothing is relative to it, and FLIP is exposed for the test");
+    }
+    constexpr double kNoiseShare = 0.2;  // Of any gate.
+    for (std::size_t i = 0; i < std::size(kRows); ++i) {
+        const std::string_view key = kRows[i].key;
+        if (!options.limits[i] || (key != "rel_mse" && key != "rel_mse_corrected")) continue;
+        if (comparison.reference_noise > kNoiseShare * *options.limits[i]) {
+            warnings.push_back(fmt::format(
+                "the reference's own noise makes a relMSE of {:.3g}, more than a fifth of what {} allows; a "
+                "reference with more samples is right",
+                comparison.reference_noise, kRows[i].flag));
+        }
+    }
+    return warnings;
+}
+
+void write_flip_map(const std::string& path, const core::FlipResult& flip, int width, int height) {
+    std::vector<std::uint8_t> bytes;
+    bytes.reserve(3 * flip.map.size());
+    for (const float error : flip.map) {
+        const glm::vec3 color = core::magma(error);
+        for (int i = 0; i < 3; ++i) bytes.push_back(static_cast<std::uint8_t>(std::lround(255 * color[i])));
+    }
+    core::write_png(path, width, height, bytes);
 }
 
 void compare(const CompareOptions& options, Program& program) {
@@ -160,16 +317,23 @@ void compare(const CompareOptions& options, Program& program) {
                 test_path, test.image.width(), test.image.height(), a.min_x, a.min_y, reference_path,
                 reference.image.width(), reference.image.height(), b.min_x, b.min_y));
     }
-    const core::ImageMetrics metrics = core::compare_images(test.radiance, reference.radiance);
-    const std::vector<std::string> failures = failures_of(options, metrics);
+    const Comparison comparison = measure(options, test, reference);
+    const std::vector<std::string> failures = failures_of(options, comparison);
+    const std::vector<std::string> warnings = warnings_of(options, comparison);
+    if (!options.flip_map.empty()) {
+        write_flip_map(options.flip_map, comparison.flip, test.image.width(), test.image.height());
+    }
     if (program.common.json) {
-        nlohmann::json report = report_of(metrics);
+        nlohmann::json report = report_of(comparison);
         report["failures"] = failures;
+        report["warnings"] = warnings;
         fmt::print("{}\n", report.dump());
     } else {
-        print_table(metrics);
+        print_table(comparison);
     }
+    for (const std::string& warning : warnings) warn(program, warning);
     for (const std::string& failure : failures) fmt::print(stderr, "fieldlight: failed: {}\n", failure);
+    if (!warnings.empty()) program.exit_code = kExitWarned;
     if (!failures.empty()) program.exit_code = kExitThresholdFailed;
 }
 
@@ -177,31 +341,42 @@ void compare(const CompareOptions& options, Program& program) {
 
 void add_compare_command(CLI::App& app, Program& program) {
     const auto options = std::make_shared<CompareOptions>();
-    CLI::App& verb = *app.add_subcommand(
-        "compare",
-        "Measure how far a picture is from its reference; exit code 2 where a threshold is exceeded");
+    CLI::App& verb = *app.add_subcommand("compare",
+                                         "Measure how far a picture is from its reference; exit code 1 where "
+                                         "the numbers come with a warning, 2 "
+                                         "where a threshold is exceeded");
     add_common_options(verb, program.common);
     verb.add_option("pictures", options->inputs, "The picture under test, then its reference: .exr or .hdr")
         ->required()
         ->expected(1, 2)
         ->type_name("TEST REFERENCE");
     verb.add_option("--layer", options->layer, "Colour layer, such as Direct; the beauty if not given");
+    verb.add_option(
+        "--flip-map", options->flip_map,
+        "Write the HDR FLIP error of every pixel as a .png: black 0 to pale yellow 1 (magma); pixels "
+        "that are not finite come out magenta");
     // Not shown: known so that the form for scenes, which is not built yet, is answered plainly.
     verb.add_option("-o", options->folder)->group("");
     for (std::size_t i = 0; i < std::size(kRows); ++i) {
         const Row& row = kRows[i];
-        const std::string definition = *row.definition ? fmt::format(" = {}", row.definition) : "";
-        verb.add_option(row.flag, options->limits[i],
-                        fmt::format("Fail where |{}| is larger{}", row.label, definition))
+        verb.add_option(row.flag, options->limits[i], help_of(row))
             ->check(CLI::NonNegativeNumber)
             ->group("Thresholds (any pixel that is not finite fails, too)");
     }
     verb.footer(
         "I is the picture under test, R the reference, Y Rec. 709 luminance. Means run over pixels and "
         "channels.\n"
+        "FLIP: Andersson et al., HPG 2020 and Eurographics 2021; its exposures come from the reference.\n"
+        "relMSE, corrected, needs the reference's Variance.R, .G, .B; its interval is a jackknife over "
+        "blocks of "
+        "pixels.\n"
+        "Exit code 1 warns: the reference is black, or its own noise makes more than a fifth of what a "
+        "threshold "
+        "on relMSE allows.\n"
         "Examples:\n"
         "  fieldlight compare noisy.exr reference.exr\n"
-        "  fieldlight compare sdf.exr triangles.exr --fail-rel-mse 0.01 --fail-energy-bias 1 --json");
+        "  fieldlight compare sdf.exr triangles.exr --fail-rel-mse 0.01 --fail-energy-bias 1 --json\n"
+        "  fieldlight compare sdf.exr triangles.exr --flip-map flip.png --fail-flip 0.05");
     verb.callback([options, &program] { run_verb(program, [&] { compare(*options, program); }); });
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -77,9 +78,13 @@ TEST_F(PictureCommands, ComparePrintsTheKeysThatScriptsRelyOn) {
     // 1.1f - 1 is good to 1e-7.
     EXPECT_NEAR(report.at("mse").get<double>(), 0.01, 1e-6);
     EXPECT_NEAR(report.at("energy_bias").get<double>(), 10.0, 1e-4);
-    for (const char* key : {"schema", "rel_mse", "rel_mse_trimmed", "mrse", "mape", "smape", "leak"}) {
+    for (const char* key :
+         {"schema", "rel_mse", "rel_mse_trimmed", "mrse", "mape", "smape", "leak", "flip", "ssim"}) {
         EXPECT_TRUE(report.at(key).is_number()) << key;
     }
+    // A value is 1.1, and the reference says nothing about its noise.
+    for (const char* key : {"flip_ldr", "rel_mse_corrected"}) EXPECT_TRUE(report.at(key).is_null()) << key;
+    EXPECT_TRUE(report.at("warnings").empty());
     for (const char* key : {"50", "95", "99", "99.9"})
         EXPECT_TRUE(report.at("percentiles").at(key).is_number());
     EXPECT_EQ(report.at("nonfinite_pixels"), 0);
@@ -105,9 +110,9 @@ TEST_F(PictureCommands, CompareFailsWithTwoWhereAThresholdIsExceeded) {
     EXPECT_NE(outcome.err.find("--fail-energy-bias allows 9"), std::string::npos) << outcome.err;
     EXPECT_EQ(outcome.err.find("--fail-mape"), std::string::npos) << outcome.err;
     EXPECT_NE(outcome.out.find("relMSE"), std::string::npos);
-    for (const char* flag :
-         {"--fail-rel-mse", "--fail-rel-mse-trimmed", "--fail-mrse", "--fail-mape", "--fail-smape",
-          "--fail-p50", "--fail-p95", "--fail-p99", "--fail-p99.9", "--fail-max"}) {
+    for (const char* flag : {"--fail-rel-mse", "--fail-rel-mse-trimmed", "--fail-mrse", "--fail-mape",
+                             "--fail-smape", "--fail-p50", "--fail-p95", "--fail-p99", "--fail-p99.9",
+                             "--fail-max", "--fail-flip", "--fail-flip-ldr"}) {
         EXPECT_EQ(run({"compare", a, b, flag, "0.0001"}).exit_code, 2) << flag;
         EXPECT_EQ(run({"compare", a, b, flag, "1"}).exit_code, 0) << flag;
     }
@@ -124,6 +129,105 @@ TEST_F(PictureCommands, CompareFailsALeakThatDoesNotCount) {
     EXPECT_EQ(run({"compare", write("right.exr", right), b, "--fail-leak", "0.001"}).exit_code, 0);
     // Darkness leaks nothing, and must not pass for it.
     EXPECT_EQ(run({"compare", write("dark.exr", dark), b, "--fail-leak", "0.001"}).exit_code, 2);
+}
+
+TEST_F(PictureCommands, CompareFailsWhatIsLessSimilarThanWanted) {
+    const std::string a = write("a.exr", 4, 4, 0.5f), b = write("b.exr", 4, 4, 1.0f);
+    EXPECT_EQ(run({"compare", a, b, "--fail-ssim", "0.999"}).exit_code, 2);
+    EXPECT_EQ(run({"compare", a, b, "--fail-ssim", "0.1"}).exit_code, 0);
+    EXPECT_EQ(run({"compare", a, a, "--fail-ssim", "0.999"}).exit_code, 0);
+}
+
+TEST_F(PictureCommands, CompareHoldsFlipAgainstThePublishedValue) {
+    // Grey 0.5 and 0.6 of the table in tests/core/image/flip_test.cpp; a constant HDR pair shows 0.85 and
+    // more.
+    const std::string a = write("a.exr", 8, 8, 0.6f), b = write("b.exr", 8, 8, 0.5f);
+    const Outcome outcome = run({"compare", a, b, "--json", "--fail-flip-ldr", "0.197"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    const nlohmann::json report = nlohmann::json::parse(outcome.out);
+    EXPECT_NEAR(report.at("flip_ldr").get<double>(), 0.196255, 1e-4);
+    EXPECT_NE(report.at("flip"), report.at("flip_ldr"));
+    EXPECT_EQ(report.at("flip_details").at("exposures").size(), 1u);
+    EXPECT_NEAR(report.at("flip_details").at("max").get<double>(), report.at("flip").get<double>(), 1e-5);
+}
+
+TEST_F(PictureCommands, CompareFailsAThresholdOnWhatIsNotDefined) {
+    const std::string a = write("a.exr", 4, 4, 1.5f), b = write("b.exr", 4, 4, 1.5f);
+    for (const char* flag : {"--fail-flip-ldr", "--fail-rel-mse-corrected"}) {
+        const Outcome outcome = run({"compare", a, b, flag, "1"});
+        EXPECT_EQ(outcome.exit_code, 2);
+        EXPECT_NE(outcome.err.find("is not defined, since"), std::string::npos) << outcome.err;
+    }
+    // Nobody asked: nothing to complain about.
+    const Outcome outcome = run({"compare", a, b});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("not defined: a value lies outside [0, 1]"), std::string::npos) << outcome.out;
+}
+
+TEST_F(PictureCommands, CompareTakesTheNoiseOfTheReferenceOut) {
+    // Half of the pixels are 1.1 and half 0.9 beside 1: MSE 0.01, of which the variance explains 0.009.
+    core::Image test(16, 16), reference(16, 16);
+    std::vector<glm::vec3> values;
+    for (int i = 0; i < 256; ++i) values.emplace_back(i % 2 == 0 ? 1.1f : 0.9f);
+    test.add_color("", values);
+    reference.add_color("", std::vector<glm::vec3>(256, glm::vec3(1.0f)));
+    reference.add_color("Variance", std::vector<glm::vec3>(256, glm::vec3(0.009f)));
+    reference.add_color("Direct", std::vector<glm::vec3>(256, glm::vec3(1.0f)));
+    test.add_color("Direct", values);
+    const std::string a = write("a.exr", test), b = write("b.exr", reference);
+    const nlohmann::json report = nlohmann::json::parse(run({"compare", a, b, "--json"}).out);
+    // The noise of the denominator is taken out as well; it is of second order.
+    EXPECT_NEAR(report.at("rel_mse_corrected").get<double>(), 0.001, 5e-4);
+    EXPECT_NEAR(report.at("rel_mse_corrected_details").at("reference_noise").get<double>(), 0.009 / 1.01,
+                1e-6);
+    EXPECT_TRUE(nlohmann::json::parse(run({"compare", a, b, "--json", "--layer", "Direct"}).out)
+                    .at("rel_mse_corrected")
+                    .is_null());
+    // Passes where the plain one fails, but the reference is too noisy for either gate.
+    EXPECT_EQ(run({"compare", a, b, "--fail-rel-mse", "0.005"}).exit_code, 2);
+    const Outcome warned = run({"compare", a, b, "--fail-rel-mse-corrected", "0.005"});
+    EXPECT_EQ(warned.exit_code, 1);
+    EXPECT_NE(warned.err.find("more than a fifth of what --fail-rel-mse-corrected allows"), std::string::npos)
+        << warned.err;
+    EXPECT_EQ(run({"compare", a, b, "--fail-rel-mse-corrected", "0.05"}).exit_code, 0);
+    EXPECT_EQ(run({"compare", a, b, "--fail-rel-mse-corrected", "0.0001"}).exit_code, 2);
+}
+
+TEST_F(PictureCommands, CompareWarnsOfABlackReference) {
+    const std::string a = write("a.exr", 4, 4, 1.0f), black = write("b.exr", 4, 4, 0.0f);
+    const Outcome outcome = run({"compare", a, black, "--json"});
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.err.find("the reference is black"), std::string::npos) << outcome.err;
+    const nlohmann::json report = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(report.at("warnings").size(), 1u);
+    EXPECT_GT(report.at("flip").get<double>(), 0.9);
+    EXPECT_EQ(run({"compare", a, black, "--fail-mse", "0.1"}).exit_code, 2);
+}
+
+TEST_F(PictureCommands, CompareWritesTheFlipMap) {
+    core::Image reference(40, 2), test(40, 2);
+    std::vector<glm::vec3> values(80, glm::vec3(0.5f));
+    reference.add_color("", values);
+    for (std::size_t i = 0; i < 80; ++i) {
+        if (i % 40 >= 20) values[i] = glm::vec3(0.0f, 0.0f, 1.0f);
+    }
+    values[39].r = std::numeric_limits<float>::quiet_NaN();
+    test.add_color("", values);
+    const std::string a = write("a.exr", test), b = write("b.exr", reference);
+    // A threshold that fails is when the map is wanted most.
+    EXPECT_EQ(run({"compare", a, b, "--flip-map", path("map.png")}).exit_code, 2);
+    const core::TextureImage png =
+        core::decode_texture_image(core::read_file_bytes(path("map.png"), 1 << 20), "map.png");
+    ASSERT_EQ(png.width, 40);
+    ASSERT_EQ(png.height, 2);
+    const auto pixel = [&](std::size_t i) {
+        return std::array<int, 3>{png.rgba[4 * i], png.rgba[4 * i + 1], png.rgba[4 * i + 2]};
+    };
+    EXPECT_EQ(pixel(0), (std::array<int, 3>{0, 0, 4}));  // Magma of 0.
+    EXPECT_GT(pixel(70)[0], 150);
+    EXPECT_EQ(pixel(39), (std::array<int, 3>{255, 0, 255}));
+    EXPECT_EQ(run({"compare", a, b, "--flip-map", path("map.jpg")}).exit_code, 64);
+    EXPECT_EQ(run({"compare", a, b, "--flip-map", path("missing/map.png")}).exit_code, 73);
 }
 
 TEST_F(PictureCommands, CompareFailsAnyNonfinitePixelAndSaysSo) {
