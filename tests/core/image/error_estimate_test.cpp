@@ -237,6 +237,20 @@ TEST(ErrorFit, OfExactErrorsIsExact) {
     }
 }
 
+TEST(ErrorFit, FitsTheOtherTermAloneWhereOneWouldBeNegative) {
+    // Weights are equal in relative error: slope alone is the mean of error x time, floor the mean error.
+    const double seconds[] = {1, 2, 4}, steep[] = {1.0, 0.5, 0.2}, rising[] = {1.0, 1.01, 1.02};
+    const auto falls = core::fit_error_over_time(seconds, steep);
+    ASSERT_TRUE(falls);
+    EXPECT_EQ(falls->floor.value, 0.0);
+    EXPECT_EQ(falls->floor.low, 0.0);
+    EXPECT_NEAR(falls->slope.value, (1.0 + 1.0 + 0.8) / 3.0, 1e-12);
+    const auto rises = core::fit_error_over_time(seconds, rising);
+    ASSERT_TRUE(rises);
+    EXPECT_EQ(rises->slope.value, 0.0);
+    EXPECT_NEAR(rises->floor.value, 1.01, 1e-12);
+}
+
 TEST(ErrorFit, HoldsTheTruthInNinetyFiveOfAHundred) {
     constexpr double kScatter = 0.05;
     for (const auto& [floor, slope] : {std::pair{0.01, 0.3}, std::pair{0.0, 0.3}, std::pair{0.02, 0.002}}) {
