@@ -21,23 +21,32 @@ void append(void* context, void* data, int size) {
                                                static_cast<std::size_t>(size));
 }
 
+/// stb counts bytes in int, one filter byte a row included.
+bool is_encodable(int height, std::span<const std::uint8_t> rgb) {
+    return rgb.size() + static_cast<std::size_t>(height) <=
+           static_cast<std::size_t>(std::numeric_limits<int>::max());
+}
+
 }  // namespace
 
-void write_png(const std::filesystem::path& path, int width, int height, std::span<const std::uint8_t> rgb) {
+std::string encode_png(int width, int height, std::span<const std::uint8_t> rgb) {
     assert(width > 0 && height > 0);
     assert(rgb.size() == std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-    // stb counts bytes in int, one filter byte a row included.
-    if (rgb.size() + static_cast<std::size_t>(height) >
-        static_cast<std::size_t>(std::numeric_limits<int>::max())) {
+    assert(is_encodable(height, rgb));
+    std::string encoded;
+    if (stbi_write_png_to_func(append, &encoded, width, height, 3, rgb.data(), 3 * width) == 0)
+        throw std::bad_alloc();
+    return encoded;
+}
+
+void write_png(const std::filesystem::path& path, int width, int height, std::span<const std::uint8_t> rgb) {
+    if (!is_encodable(height, rgb)) {
         throw InputError(ErrorKind::kUsage,
                          fmt::format("'{}': {} x {} pixels are too many for a PNG; less than 2^31 "
                                      "bytes can be written",
                                      path.string(), width, height));
     }
-    std::string encoded;
-    if (stbi_write_png_to_func(append, &encoded, width, height, 3, rgb.data(), 3 * width) == 0)
-        throw std::bad_alloc();
-    write_text_atomically(path, encoded);
+    write_text_atomically(path, encode_png(width, height, rgb));
 }
 
 }  // namespace core
