@@ -39,7 +39,11 @@ class Viewer {
   // ---- What is shown
 
   // Repaints the pictures where pictures, mode or exposure changed, then draws.
-  async update() {
+  update() {
+    return (this.updating = this.updateNow());
+  }
+
+  async updateNow() {
     const ticket = (this.ticket = {});
     try {
       const [a, b, reference] = await Promise.all(
@@ -55,6 +59,11 @@ class Viewer {
     this.draw();
     this.readOut();
     this.writeAddress();
+  }
+
+  // Done when no change is under way.
+  async settled() {
+    for (let last = null; last !== this.updating; ) await (last = this.updating);
   }
 
   paint() {
@@ -309,7 +318,7 @@ class Viewer {
     element("message").hidden = !text;
   }
 
-  // ---- State, and its form in the address: #a=NAME&b=NAME&mode=MODE&ev=EV&gain=GAIN
+  // ---- State, and its form in the address: #a=NAME&b=NAME&mode=MODE&stops=STOPS&gain=GAIN
 
   set(change) {
     Object.assign(this.state, change);
@@ -318,11 +327,11 @@ class Viewer {
   }
 
   writeAddress() {
+    if (!this.changed) return; // Nothing was asked for: the address stays as it was opened.
     const { state, data } = this;
     const parts = [["a", data.pictures[state.a].name], ["b", data.pictures[state.b].name], ["mode", state.mode]];
-    if (state.stops !== 0) parts.push(["ev", this.ev.toFixed(2)]);
+    if (state.stops !== 0) parts.push(["stops", state.stops]);
     if (state.gain !== 1) parts.push(["gain", state.gain]);
-    if (!this.changed) return; // Nothing was asked for: the address stays as it was opened.
     history.replaceState(null, "", "#" + parts.map(([key, value]) => `${key}=${encodeURIComponent(value)}`).join("&"));
   }
 
@@ -336,8 +345,8 @@ class Viewer {
       if (this.exact.includes(index)) change[key] = index;
     }
     if (MODES.some((mode) => mode.id === asked.get("mode"))) change.mode = asked.get("mode");
-    const ev = Number.parseFloat(asked.get("ev"));
-    if (Number.isFinite(ev)) change.stops = this.data.ev - ev;
+    const stops = Number.parseFloat(asked.get("stops"));
+    if (Math.abs(stops) <= 8) change.stops = stops;
     if (["1", "4", "16", "64"].includes(asked.get("gain"))) change.gain = Number(asked.get("gain"));
     Object.assign(this.state, change);
     if (!this.available(this.state.mode)) this.state.mode = "a";

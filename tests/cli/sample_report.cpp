@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "core/image/metrics.h"
+#include "core/image/image.h"
 
 namespace tests {
 
@@ -16,14 +16,18 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// A smooth picture over six decades with the values that are easily got wrong in one corner.
+/// A smooth picture over six decades, times 1 at the left edge to nearly `factor` at the right, with the
+/// values that are easily got wrong in one corner.
 std::vector<glm::vec3> radiance(int width, int height, float factor) {
     std::vector<glm::vec3> values;
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x)
-            values.push_back(factor * glm::vec3(std::exp2(0.4f * static_cast<float>(x) - 6.0f),
-                                                1.0f + 0.37f * static_cast<float>(x * y),
-                                                static_cast<float>(y) * 0.013f));
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            const float scale = 1.0f + (factor - 1.0f) * static_cast<float>(x) / static_cast<float>(width);
+            values.push_back(scale * glm::vec3(std::exp2(0.4f * static_cast<float>(x) - 6.0f),
+                                               1.0f + 0.37f * static_cast<float>(x * y),
+                                               static_cast<float>(y) * 0.013f));
+        }
+    }
     values[0] = {-0.0f, std::numeric_limits<float>::denorm_min(), -1.5f};
     values[1] = {std::numeric_limits<float>::max(), 1.0f / 3.0f, 16777217.0f};
     return values;
@@ -80,11 +84,14 @@ cli::ReportPicture picture(const std::string& name, const std::string& exr, int 
                            float factor) {
     cli::ReportPicture result{name, exr, radiance(width, height, factor), {}, {}, {}};
     if (factor == 1.0f) return result;
+    const std::vector<glm::vec3> reference = radiance(width, height, 1.0f);
     const auto count = result.radiance.size();
     for (std::size_t i = 0; i < count; ++i) {
         const float part = static_cast<float>(i) / static_cast<float>(count - 1);
+        const float truth = core::luminance(reference[i]);
         result.flip.push_back(part);
-        result.relative_error.push_back(std::abs(factor - 1.0f));
+        result.relative_error.push_back(std::abs(core::luminance(result.radiance[i]) - truth) /
+                                        (std::abs(truth) + 0.01f));
         result.steps.push_back(40.0f * part);
     }
     return result;

@@ -100,7 +100,7 @@ class Browser:
         return message
 
     def wait_for(self, method):
-        """Waits for an event that has not been seen before this call's open_page."""
+        """Waits for an event, unless it is among those that are kept."""
         while not any(event["method"] == method for event in self.events):
             self._read()
 
@@ -114,11 +114,10 @@ class Browser:
         """Opens a page, waits until it and its viewer are there."""
         self.send("Emulation.setScriptExecutionDisabled", value=not scripts)
         # A page that differs in its hash alone would not be loaded again.
-        self.send("Page.navigate", url="about:blank")
-        self.wait_for("Page.loadEventFired")
-        self.events.clear()
-        self.send("Page.navigate", url=url)
-        self.wait_for("Page.loadEventFired")
+        for address in ("about:blank", url):
+            self.events.clear()
+            self.send("Page.navigate", url=address)
+            self.wait_for("Page.loadEventFired")
         if scripts:
             self.evaluate("window.fieldlight && window.fieldlight.ready")
 
