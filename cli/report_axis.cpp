@@ -31,6 +31,8 @@ double LogAxis::at(double value) const {
 
 std::vector<Tick> LogAxis::ticks() const {
     const double decades = std::log10(high_ / low_);
+    // From 5 to 10 it is 0.3 decades: enough for a short number.
+    const bool roomy = std::abs(end_ - begin_) >= 110.0 * decades;
     const auto first = static_cast<int>(std::floor(std::log10(low_)));
     const auto last = static_cast<int>(std::floor(std::log10(high_)));
     // Where very many decades must fit, not each bears a number.
@@ -40,8 +42,7 @@ std::vector<Tick> LogAxis::ticks() const {
         for (int digit = 1; digit <= 9; ++digit) {
             const double value = digit * std::pow(10.0, exponent);
             if (!contains(value) || (stride > 1 && digit > 1)) continue;
-            const bool numbered =
-                digit == 1 ? exponent % stride == 0 : decades < 2.5 && (digit == 2 || digit == 5);
+            const bool numbered = digit == 1 ? exponent % stride == 0 : roomy && (digit == 2 || digit == 5);
             ticks.push_back({value, numbered ? fixed(value, std::clamp(-exponent, 0, 6)) : ""});
         }
     }

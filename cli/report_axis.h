@@ -33,8 +33,8 @@ public:
     /// Where a value lies; at the nearer end if it lies outside. @pre value > 0
     double at(double value) const;
 
-    /// Every 1 to 9 times a power of ten inside. Powers of ten bear numbers; below two and a half decades
-    /// also 2 and 5.
+    /// Every 1 to 9 times a power of ten inside. Powers of ten bear numbers, where there is
+    /// room also 2 and 5.
     std::vector<Tick> ticks() const;
 
 private:

@@ -189,12 +189,16 @@ private:
     }
 
     std::string band(const PlotSeries& series) const {
-        if (series.points.size() < 2) return "";
         std::string upper, lower;
+        std::size_t count = 0;
         for (const PlotPoint& point : series.points) {
+            // Where noise of the reference hides the error, only the point at the bottom says so.
+            if (!(point.error > 0.0)) continue;
+            ++count;
             upper += fmt::format("{:.1f},{:.1f} ", x_.at(point.cost), y_of(point.high));
             lower = fmt::format("{:.1f},{:.1f} ", x_.at(point.cost), y_of(point.low)) + lower;
         }
+        if (count < 2) return "";
         return fmt::format("<polygon class=\"band {}\" points=\"{}{}\"/>\n",
                            series_class(report_, series.index), upper, lower);
     }
@@ -297,9 +301,9 @@ private:
         const ReportSeries& series = report_.series[label.series];
         const auto floor = floor_percent(series);
         std::string svg =
-            fmt::format("<g class=\"{}\"><path class=\"leader\" d=\"M{:.1f} {:.1f}L{} {:.1f}H{}\"/>",
-                        series_class(report_, label.series), label.from_x, label.from_y, kLabelLeft - 14.0,
-                        label.y, kLabelLeft - 5.0);
+            fmt::format("<g class=\"{}\"><path class=\"leader{}\" d=\"M{:.1f} {:.1f}L{} {:.1f}H{}\"/>",
+                        series_class(report_, label.series), label.from_x < kRight - 1.0 ? " far" : "",
+                        label.from_x, label.from_y, kLabelLeft - 14.0, label.y, kLabelLeft - 5.0);
         svg += fmt::format("<text x=\"{}\" y=\"{:.1f}\"><title>{}</title>{}", kLabelLeft,
                            label.y + (two_lines && floor ? -2.0 : 4.0), escape_html(series.method),
                            escape_html(shortened(series.method, kLabelCharacters)));

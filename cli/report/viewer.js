@@ -297,8 +297,8 @@ class Viewer {
     const { data } = this;
     const legends = {
       flip: ["FLIP of A against the reference", "0", "1", "magma"],
-      error: ["relative error of A, logarithmic", `${100 * data.error_low} %`, `${100 * data.error_high} %`, "magma"],
-      steps: ["tracer steps a camera ray of A", "0", String(data.steps_high), "viridis"],
+      error: ["relative error of A, logarithmic", `${compact(100 * data.error_low)} %`, `${compact(100 * data.error_high)} %`, "magma"],
+      steps: ["tracer steps a camera ray of A", "0", compact(data.steps_high), "viridis"],
       signed: ["luminance, A − B", "A darker", "A brighter", "signed"],
     };
     const legend = legends[this.state.mode];

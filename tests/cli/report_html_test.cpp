@@ -290,8 +290,8 @@ TEST(ErrorPlot, KeepsItsLabelsApart) {
     for (const cli::CostAxis axis : {cli::CostAxis::kWarm, cli::CostAxis::kRays}) {
         const std::string svg = cli::error_plot(report, axis);
         std::vector<double> heights;
-        for (std::size_t at = svg.find("class=\"leader\""); at != std::string::npos;
-             at = svg.find("class=\"leader\"", at + 1)) {
+        for (std::size_t at = svg.find("class=\"leader"); at != std::string::npos;
+             at = svg.find("class=\"leader", at + 1)) {
             const std::size_t y = svg.find(" y=\"", at);
             heights.push_back(std::strtod(svg.c_str() + y + 4, nullptr));
         }
