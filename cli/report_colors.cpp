@@ -7,23 +7,25 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "core/image/flip.h"
 #include "core/image/tonemap.h"
 
 namespace cli {
 
 namespace {
 
-constexpr std::size_t kAnchors = 11;
-using Anchors = std::array<std::uint32_t, kAnchors>;
+/// Samples of the published viridis at even steps; between them colours are mixed in sRGB.
+constexpr std::array<std::uint32_t, 11> kViridis = {0x440154, 0x482576, 0x414487, 0x35608D,
+                                                    0x2A788E, 0x21908C, 0x22A884, 0x43BF71,
+                                                    0x7AD151, 0xBBDF27, 0xFDE725};
 
-/// Samples of the published maps at even steps; between them colours are mixed in sRGB.
-constexpr Anchors kMagmaAnchors = {0x000004, 0x150E37, 0x3B0F70, 0x641A80, 0x8C2981, 0xB63679,
-                                   0xDE4968, 0xF76F5C, 0xFE9F6D, 0xFECE91, 0xFCFDBF};
-constexpr Anchors kViridisAnchors = {0x440154, 0x482576, 0x414487, 0x35608D, 0x2A788E, 0x21908C,
-                                     0x22A884, 0x43BF71, 0x7AD151, 0xBBDF27, 0xFDE725};
-
-const Anchors& anchors_of(HeatMap map) {
-    return map == HeatMap::kMagma ? kMagmaAnchors : kViridisAnchors;
+glm::vec3 viridis(float value) {
+    const float at = std::clamp(value, 0.0f, 1.0f) * static_cast<float>(kViridis.size() - 1);
+    const auto first = std::min(static_cast<std::size_t>(at), kViridis.size() - 2);
+    const auto color = [](std::uint32_t rgb) {
+        return glm::vec3(rgb >> 16, rgb >> 8 & 0xFFu, rgb & 0xFFu) / 255.0f;
+    };
+    return glm::mix(color(kViridis[first]), color(kViridis[first + 1]), at - static_cast<float>(first));
 }
 
 /// The smallest of 1, 2, 5 times a power of ten that is not below `value`. @pre value > 0
@@ -43,19 +45,11 @@ int displayed_level(float linear) {
 
 std::array<std::uint8_t, 3> heat_color(HeatMap map, float value) {
     if (std::isnan(value)) return {255, 0, 255};
-    const Anchors& anchors = anchors_of(map);
-    const float at = std::clamp(value, 0.0f, 1.0f) * static_cast<float>(kAnchors - 1);
-    const auto first = std::min(static_cast<std::size_t>(at), kAnchors - 2);
-    const float part = at - static_cast<float>(first);
-    std::array<std::uint8_t, 3> color{};
-    for (unsigned i = 0; i < 3; ++i) {
-        const auto level = [&](std::size_t anchor) {
-            return static_cast<float>(anchors[anchor] >> (16 - 8 * i) & 0xFFu);
-        };
-        color[i] =
-            static_cast<std::uint8_t>(std::lround(level(first) + part * (level(first + 1) - level(first))));
-    }
-    return color;
+    const glm::vec3 color = map == HeatMap::kMagma ? core::magma(value) : viridis(value);
+    std::array<std::uint8_t, 3> levels{};
+    for (int i = 0; i < 3; ++i)
+        levels[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(std::lround(255.0f * color[i]));
+    return levels;
 }
 
 float HeatScale::at(float value) const {
@@ -85,7 +79,10 @@ std::vector<std::uint8_t> heat_picture(std::span<const float> values, const Heat
 
 std::string css_gradient(HeatMap map) {
     std::string css = "linear-gradient(to right";
-    for (const std::uint32_t color : anchors_of(map)) css += fmt::format(",#{:06x}", color);
+    for (int i = 0; i <= 16; ++i) {
+        const auto color = heat_color(map, static_cast<float>(i) / 16.0f);
+        css += fmt::format(",#{:02x}{:02x}{:02x}", color[0], color[1], color[2]);
+    }
     return css + ")";
 }
 
