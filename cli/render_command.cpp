@@ -1,7 +1,6 @@
 // cli/render_command.cpp: the flags of `fieldlight render`.
 #include <fmt/format.h>
 
-#include <charconv>
 #include <iostream>
 #include <memory>
 
@@ -12,8 +11,6 @@
 namespace cli {
 
 namespace {
-
-constexpr int kMaxDimension = 1 << 15;
 
 /// What is typed, before it is understood.
 struct RenderFlags {
@@ -35,23 +32,6 @@ struct RenderFlags {
     throw core::InputError(core::ErrorKind::kUsage, message);
 }
 
-void parse_size(const std::string& text, RenderOptions& options) {
-    const std::size_t cross = text.find('x');
-    const char* end = text.data() + text.size();
-    int width = 0, height = 0;
-    if (cross != std::string::npos) {
-        const auto first = std::from_chars(text.data(), text.data() + cross, width);
-        const auto second = std::from_chars(text.data() + cross + 1, end, height);
-        if (first.ptr != text.data() + cross || second.ptr != end) width = height = 0;
-    }
-    if (width < 1 || height < 1 || width > kMaxDimension || height > kMaxDimension) {
-        fail(fmt::format("--size {}: takes WIDTHxHEIGHT, such as 1280x720, each from 1 to {}", text,
-                         kMaxDimension));
-    }
-    options.width = width;
-    options.height = height;
-}
-
 void parse_crop(const std::string& text, RenderOptions& options) {
     if (text.empty()) return;
     const std::vector<double> numbers = parse_numbers("--crop", text, 4, 4);
@@ -69,12 +49,15 @@ void parse_crop(const std::string& text, RenderOptions& options) {
     }
 }
 
-RenderOptions understand(const RenderFlags& flags) {
+RenderOptions understand(const RenderFlags& flags, const CommonOptions& common) {
     RenderOptions options = flags.options;
+    options.seed = common.seed;
     if (flags.renderer != "path") {
         fail(fmt::format("--renderer {}: is not built yet; only 'path' is", flags.renderer));
     }
-    parse_size(flags.size, options);
+    const glm::ivec2 size = parse_size(flags.size);
+    options.width = size.x;
+    options.height = size.y;
     parse_crop(flags.crop, options);
     if (flags.exposure != "auto") {
         options.exposure = static_cast<float>(parse_numbers("--exposure", flags.exposure, 1, 1)[0]);
@@ -118,6 +101,7 @@ void add_render_command(CLI::App& app, Program& program) {
     const std::map<std::string, TracerKind> tracers = {{"sdf", TracerKind::kSdf},
                                                        {"triangle", TracerKind::kTriangle}};
 
+    add_scene_file(*verb, options.scene);
     add_scene_options(*verb, options.scene);
     verb->add_option("-o,--output", options.output, "The EXR to write")->required();
     verb->add_option("--tracer", options.tracer, "What rays after the first meet: sdf (default) or triangle")
@@ -174,7 +158,7 @@ void add_render_command(CLI::App& app, Program& program) {
 
     verb->callback([flags, &program] {
         run_verb(program, [&] {
-            const RenderOptions understood = understand(*flags);
+            const RenderOptions understood = understand(*flags, program.common);
             print_summary(program, understood, run_render(program, understood));
         });
     });

@@ -1,114 +1,29 @@
 #include "cli/render_job.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
-#include <algorithm>
-#include <chrono>
 #include <memory>
+#include <stdexcept>
 
-#include "core/image/exr.h"
+#include "cli/machine.h"
+#include "cli/stage_clock.h"
 #include "core/image/png.h"
 #include "core/render/path_tracer.h"
 #include "core/support/atomic_file.h"
 #include "core/support/error.h"
 #include "core/support/parallel.h"
-#include "core/trace/triangle_tracer.h"
-#include "sdf/sdf_tracer.h"
 
 namespace cli {
 
 namespace {
-
-/// Seconds since it was made or last asked.
-class StageClock {
-public:
-    double lap() {
-        const auto now = std::chrono::steady_clock::now();
-        const double seconds = std::chrono::duration<double>(now - last_).count();
-        last_ = now;
-        return seconds;
-    }
-
-private:
-    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
-/// The tracers that a picture needs, and no others.
-struct Tracers {
-    std::unique_ptr<core::TriangleTracer> triangle;
-    std::unique_ptr<sdf::SdfTracer> sdf;
-
-    const core::Tracer& get(TracerKind kind) const {
-        if (kind == TracerKind::kSdf) return *sdf;
-        return *triangle;
-    }
-};
 
 std::filesystem::path bake_folder(const RenderOptions& options) {
     if (!options.bake_folder.empty()) return options.bake_folder;
     return options.output.parent_path() / (options.scene.file.stem().string() + ".bake");
 }
 
-sdf::BakeResult bake(const Program& program, const RenderOptions& options, const core::Scene& scene) {
-    sdf::BakeResult result =
-        sdf::bake_scene(scene, options.bake, bake_folder(options), make_progress(program), stop_flag());
-    if (stop_flag()()) throw core::Interrupted();  // The bake ends early and says nothing.
-    for (const sdf::MeshBake& mesh : result.meshes) {
-        if (mesh.error) {
-            warn(program,
-                 fmt::format("{}; it is missing from everything traced through fields", mesh.error->what()));
-            continue;
-        }
-        for (const std::string& warning : mesh.warnings) {
-            warn(program, fmt::format("mesh '{}': {}", mesh.name, warning));
-        }
-    }
-    return result;
-}
-
-core::ExrAttributes attributes_of(const Program& program, const RenderOptions& options,
-                                  const core::Scene& scene, const core::Camera& camera,
-                                  const core::Frame& frame) {
-    const core::CameraRays rays(camera, options.width, options.height);
-    core::ExrAttributes attributes;
-    // OpenEXR's camera space is left-handed and looks along +Z; glTF's looks along -Z.
-    const glm::dmat4 flip_z(glm::dvec4(1, 0, 0, 0), glm::dvec4(0, 1, 0, 0), glm::dvec4(0, 0, -1, 0),
-                            glm::dvec4(0, 0, 0, 1));
-    attributes["worldToCamera"] = glm::mat4(flip_z * rays.camera_from_world());
-    attributes["worldToNDC"] = glm::mat4(rays.ndc_from_world());
-    attributes["samplesPerPixel"] = static_cast<int>(frame.samples_per_pixel);
-    attributes["seed"] = std::to_string(program.common.seed);
-    attributes["fieldlightVersion"] = std::string(FIELDLIGHT_VERSION);
-    attributes["renderer"] = std::string("path");
-    attributes["tracer"] = std::string(name_of(options.tracer));
-    attributes["primary"] = std::string(name_of(options.primary));
-    attributes["bounces"] = options.bounces < 0 ? std::string("unlimited") : std::to_string(options.bounces);
-    attributes["sceneHash"] = core::scene_hash(scene);
-    attributes["sky"] = scene.sky_description;
-    attributes["sun"] = options.scene.sun.empty() ? std::string("none") : options.scene.sun;
-    if (options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf) {
-        attributes["voxels"] = options.bake.voxel_world
-                                   ? fmt::format("{} world units", *options.bake.voxel_world)
-                                   : fmt::format("{} on the longest side", options.bake.resolution);
-    }
-    return attributes;
-}
-
-const char* instruction_set() {
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) return "avx512";
-    if (__builtin_cpu_supports("avx2")) return "avx2";
-    return "sse4";
-}
-
-std::uint64_t peak_memory_bytes() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
-
 nlohmann::json statistics_of(const Program& program, const RenderOptions& options, const core::Frame& frame,
-                             const Tracers& tracers) {
+                             const SceneTracers& tracers) {
     nlohmann::json passes = nlohmann::json::array();
     for (const core::PassCost& pass : frame.passes) {
         passes.push_back({{"name", pass.name}, {"seconds", pass.seconds}, {"rays", pass.rays}});
@@ -142,15 +57,56 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
             {"nonfinite_pixels", 0}};
 }
 
-void check_finite(const core::Image& image) {
-    const std::size_t bad = core::count_nonfinite(image);
-    if (bad > 0) throw std::runtime_error(fmt::format("{} values of the picture are not finite", bad));
-}
-
 }  // namespace
 
-const char* name_of(TracerKind kind) {
-    return kind == TracerKind::kSdf ? "sdf" : "triangle";
+core::Frame render_frame(const Program& program, const RenderOptions& options, const core::Scene& scene,
+                         const core::Camera& camera, const SceneTracers& tracers) {
+    core::PathTracer renderer({options.samples_per_pixel, options.bounces});
+    core::Frame frame = renderer.render({.scene = scene,
+                                         .camera = camera,
+                                         .tracer = tracers.get(options.tracer),
+                                         .primary = tracers.get(options.primary),
+                                         .width = options.width,
+                                         .height = options.height,
+                                         .crop = options.crop,
+                                         .seed = options.seed,
+                                         .aovs = options.aovs,
+                                         .time_budget_seconds = options.time_budget_seconds,
+                                         .progress = make_progress(program),
+                                         .stop_requested = stop_flag()});
+    const std::size_t bad = core::count_nonfinite(frame.image);
+    if (bad > 0) {
+        throw std::runtime_error(
+            fmt::format("'{}': {} values of the picture are not finite", options.output.string(), bad));
+    }
+    return frame;
+}
+
+core::ExrAttributes picture_attributes(const RenderOptions& options, const core::Scene& scene,
+                                       const core::Camera& camera, const core::Frame& frame) {
+    const core::CameraRays rays(camera, options.width, options.height);
+    core::ExrAttributes attributes;
+    // OpenEXR's camera space is left-handed and looks along +Z; glTF's looks along -Z.
+    const glm::dmat4 flip_z(glm::dvec4(1, 0, 0, 0), glm::dvec4(0, 1, 0, 0), glm::dvec4(0, 0, -1, 0),
+                            glm::dvec4(0, 0, 0, 1));
+    attributes["worldToCamera"] = glm::mat4(flip_z * rays.camera_from_world());
+    attributes["worldToNDC"] = glm::mat4(rays.ndc_from_world());
+    attributes["samplesPerPixel"] = static_cast<int>(frame.samples_per_pixel);
+    attributes["seed"] = std::to_string(options.seed);
+    attributes["fieldlightVersion"] = std::string(FIELDLIGHT_VERSION);
+    attributes["renderer"] = std::string("path");
+    attributes["tracer"] = std::string(name_of(options.tracer));
+    attributes["primary"] = std::string(name_of(options.primary));
+    attributes["bounces"] = options.bounces < 0 ? std::string("unlimited") : std::to_string(options.bounces);
+    attributes["sceneHash"] = core::scene_hash(scene);
+    attributes["sky"] = scene.sky_description;
+    attributes["sun"] = options.scene.sun.empty() ? std::string("none") : options.scene.sun;
+    if (options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf) {
+        attributes["voxels"] = options.bake.voxel_world
+                                   ? fmt::format("{} world units", *options.bake.voxel_world)
+                                   : fmt::format("{} on the longest side", options.bake.resolution);
+    }
+    return attributes;
 }
 
 nlohmann::json run_render(const Program& program, const RenderOptions& options) {
@@ -163,34 +119,20 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     const bool needs_sdf = options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf;
     const bool needs_triangles =
         options.tracer == TracerKind::kTriangle || options.primary == TracerKind::kTriangle;
-    Tracers tracers;
+    SceneTracers tracers;
     std::optional<sdf::BakeResult> baked;
-    if (needs_sdf) baked = bake(program, options, scene);
+    if (needs_sdf) baked = bake_fields(program, scene, options.bake, bake_folder(options));
     const double bake_seconds = clock.lap();
 
     if (needs_triangles) tracers.triangle = std::make_unique<core::TriangleTracer>(scene);
     if (baked) tracers.sdf = std::make_unique<sdf::SdfTracer>(scene, sdf::grids_by_mesh(scene, *baked));
     const double build_seconds = clock.lap();
 
-    core::PathTracer renderer({options.samples_per_pixel, options.bounces});
-    const core::RenderInputs inputs{.scene = scene,
-                                    .camera = camera,
-                                    .tracer = tracers.get(options.tracer),
-                                    .primary = tracers.get(options.primary),
-                                    .width = options.width,
-                                    .height = options.height,
-                                    .crop = options.crop,
-                                    .seed = program.common.seed,
-                                    .aovs = options.aovs,
-                                    .time_budget_seconds = options.time_budget_seconds,
-                                    .progress = make_progress(program),
-                                    .stop_requested = stop_flag()};
-    const core::Frame frame = renderer.render(inputs);
+    const core::Frame frame = render_frame(program, options, scene, camera, tracers);
     const double render_seconds = clock.lap();
 
-    check_finite(frame.image);
     const std::size_t saturated = core::write_exr(
-        options.output, frame.image, attributes_of(program, options, scene, camera, frame), options.half);
+        options.output, frame.image, picture_attributes(options, scene, camera, frame), options.half);
     if (saturated > 0) {
         warn(program, fmt::format("'{}': {} values beyond 65,504 were saturated by --half",
                                   options.output.string(), saturated));

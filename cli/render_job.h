@@ -9,14 +9,13 @@
 #include <string>
 
 #include "cli/scene_setup.h"
+#include "cli/scene_tracers.h"
+#include "core/image/exr.h"
 #include "core/image/tonemap.h"
 #include "core/render/renderer.h"
 #include "sdf/baker.h"
 
 namespace cli {
-
-enum class TracerKind { kSdf, kTriangle };
-const char* name_of(TracerKind kind);
 
 /// What `fieldlight render` was asked for.
 struct RenderOptions {
@@ -29,6 +28,7 @@ struct RenderOptions {
     core::Crop crop;
     int samples_per_pixel = 64;
     int bounces = -1;  ///< -1: no limit.
+    std::uint64_t seed = 0;
     double time_budget_seconds = 0.0;
     std::set<std::string> aovs;
     sdf::BakeSettings bake;
@@ -39,6 +39,15 @@ struct RenderOptions {
     core::ToneMap tone_map = core::ToneMap::kAces;
     std::filesystem::path stats;
 };
+
+/// The picture alone, of a scene that is ready to be traced.
+/// @throws core::InputError, core::Interrupted; std::runtime_error if a value is not finite
+core::Frame render_frame(const Program& program, const RenderOptions& options, const core::Scene& scene,
+                         const core::Camera& camera, const SceneTracers& tracers);
+
+/// Everything that decided the picture, as the EXR keeps it.
+core::ExrAttributes picture_attributes(const RenderOptions& options, const core::Scene& scene,
+                                       const core::Camera& camera, const core::Frame& frame);
 
 /// Renders and writes everything that was promised. Returns the object of `--stats`.
 /// @throws core::InputError, core::Interrupted; std::runtime_error if a pixel is not finite (nothing is

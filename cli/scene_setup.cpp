@@ -92,8 +92,28 @@ std::vector<double> parse_numbers(const std::string& flag, const std::string& te
     return numbers;
 }
 
-void add_scene_options(CLI::App& verb, SceneOptions& options) {
+glm::ivec2 parse_size(const std::string& text) {
+    constexpr int kMaxDimension = 1 << 15;
+    const std::size_t cross = text.find('x');
+    const char* end = text.data() + text.size();
+    int width = 0, height = 0;
+    if (cross != std::string::npos) {
+        const auto first = std::from_chars(text.data(), text.data() + cross, width);
+        const auto second = std::from_chars(text.data() + cross + 1, end, height);
+        if (first.ptr != text.data() + cross || second.ptr != end) width = height = 0;
+    }
+    if (width < 1 || height < 1 || width > kMaxDimension || height > kMaxDimension) {
+        throw usage_error(fmt::format("--size {}: takes WIDTHxHEIGHT, such as 1280x720, each from 1 to {}",
+                                      text, kMaxDimension));
+    }
+    return {width, height};
+}
+
+void add_scene_file(CLI::App& verb, SceneOptions& options) {
     verb.add_option("SCENE", options.file, "A .gltf or .glb file")->required();
+}
+
+void add_scene_options(CLI::App& verb, SceneOptions& options) {
     verb.add_option("--scene", options.scene, "Name or number of the glTF scene");
     verb.add_option(
         "--sky", options.sky,

@@ -27,6 +27,9 @@ inline constexpr double kSunDiameterDegrees = 0.53;
 /// Radiance of the sky that a scene without any light gets, cd/m^2, from everywhere.
 inline constexpr float kDefaultSkyRadiance = 1.0f;
 
+/// The file, as the verb's first argument.
+void add_scene_file(CLI::App& verb, SceneOptions& options);
+/// Which of the file's scenes, and what lights it beside the file's own lights.
 void add_scene_options(CLI::App& verb, SceneOptions& options);
 void add_camera_options(CLI::App& verb, SceneOptions& options);
 
@@ -42,5 +45,8 @@ core::Camera choose_camera(const Program& program, const SceneOptions& options, 
 /// `most` finite ones.
 std::vector<double> parse_numbers(const std::string& flag, const std::string& text, std::size_t least,
                                   std::size_t most);
+
+/// WIDTHxHEIGHT. @throws core::InputError naming --size
+glm::ivec2 parse_size(const std::string& text);
 
 }  // namespace cli
