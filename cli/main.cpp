@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
     } catch (const core::InputError& error) {
         return fail(static_cast<int>(error.kind()), error.what());
     } catch (const core::Interrupted&) {
-        return fail(cli::stop_exit_code(), "stopped; nothing was written");
+        return fail(cli::stop_exit_code(), "stopped; no unfinished file is left");
     } catch (const std::bad_alloc&) {
         return fail(kExitOutOfMemory, "out of memory");
     } catch (const std::exception& error) {

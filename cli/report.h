@@ -32,6 +32,7 @@ struct StageCost {
 /// One rung of a ladder: one method at one number of samples.
 struct ReportPoint {
     int samples_per_pixel = 0;
+    std::uint64_t seed = 0;    ///< Every rung has its own, the same for all methods.
     double seconds = 0.0;      ///< Wall time of the rendering alone (warm).
     double cpu_seconds = 0.0;  ///< Processor time of the same, over all threads.
     std::uint64_t rays = 0;
@@ -50,11 +51,13 @@ struct ReportSeries {
     double median_voxel = 0.0;  ///< World size, median over instances; 0 for triangles.
     double load_seconds = 0.0, bake_seconds = 0.0, build_seconds = 0.0;  ///< What cold adds to warm.
     bool bake_reused = false;  ///< Some field came from an earlier run: bake_seconds is not the whole price.
-    std::uint64_t bytes = 0;   ///< Of the acceleration structure.
+    bool bake_recorded = false;  ///< All fields did, and bake_seconds is what that run recorded beside them.
+    std::uint64_t bytes = 0;     ///< Of the acceleration structure.
     std::vector<ReportPoint> points;  ///< Ascending samples.
 
-    /// relMSE(t) = floor + variance_seconds / t, fitted to the points over warm wall time; what no time
-    /// removes, and the time to unit error above it. Empty where fewer than three points allow no fit.
+    /// relMSE(t) = floor + variance_seconds / t in warm wall time: what no time removes, and the time to unit
+    /// error above it. Fitted over samples, which the last rung's time turns into seconds. Empty where fewer
+    /// than three points allow no fit.
     std::optional<Estimate> floor;
     std::optional<Estimate> variance_seconds;
     std::optional<Estimate>
@@ -107,9 +110,12 @@ struct Report {
     int bounces = -1;  ///< -1: no limit.
     std::string camera, sky, sun;
 
+    std::uint64_t peak_bytes = 0;  ///< Most memory that the comparison held.
+
     int reference_samples = 0;
+    std::uint64_t reference_seed = 0;
     bool reference_reused = false;
-    double reference_seconds = 0.0;
+    double reference_seconds = 0.0;       ///< 0 where it was reused.
     double reference_rel_variance = 0.0;  ///< Its own relMSE against the truth, from its variance.
     std::string reference_command;
 
@@ -119,12 +125,16 @@ struct Report {
 
     std::vector<ReportSeries> series;
     std::vector<ReportGeometry> geometry;
+    std::string geometry_rays;            ///< Which rays these are, in words.
     std::vector<ReportPicture> pictures;  ///< The reference first.
 };
 
 /// The object of report.json (schema 1): `geometry`, `series` (method, settings, seconds, cpu_seconds, rays,
 /// metrics, command), `pareto` and everything else but the pictures' values.
 nlohmann::json report_json(const Report& report);
+
+/// What a person reads on the terminal: a line a rung, the geometry, the verdict.
+std::string report_text(const Report& report);
 
 /// One line a point, with a header line; RFC 4180.
 std::string report_csv(const Report& report);

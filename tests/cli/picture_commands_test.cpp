@@ -260,14 +260,6 @@ TEST_F(PictureCommands, CompareRefusesWhatCannotBeCompared) {
     EXPECT_NE(layer.err.find("Direct.R"), std::string::npos) << layer.err;
 }
 
-TEST_F(PictureCommands, CompareOfASceneSaysThatItIsNotBuiltYet) {
-    for (const char* scene : {"room.gltf", "room.GLB"}) {
-        const Outcome outcome = run({"compare", scene, "-o", "out"});
-        EXPECT_EQ(outcome.exit_code, 64);
-        EXPECT_NE(outcome.err.find("not built yet"), std::string::npos) << outcome.err;
-    }
-}
-
 TEST_F(PictureCommands, CompareReadsALayer) {
     core::Image a(1, 1), b(1, 1);
     a.add_color("", {{1, 1, 1}});

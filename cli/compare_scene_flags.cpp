@@ -1,0 +1,82 @@
+#include "cli/compare_scene_flags.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "core/render/path_tracer.h"
+#include "core/support/error.h"
+#include "sdf/sampled_field.h"
+
+namespace cli {
+
+void CompareSceneFlags::add_to(CLI::App& verb) {
+    const auto names = [&] {
+        const auto options = std::as_const(verb).get_options();
+        return std::set<const CLI::Option*>(options.begin(), options.end());
+    };
+    const std::set<const CLI::Option*> before = names();
+
+    verb.add_option(
+        "-o,--output", options_.folder,
+        "Folder for report.html, report.json, report.csv and pictures; made if missing; keeps the "
+        "reference and the fields for the next run");
+    add_scene_options(verb, options_.scene);
+    add_camera_options(verb, options_.scene);
+    verb.add_option("--size", size_, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    bounces_option_ = verb.add_option("--bounces", bounces_,
+                                      "Indirect bounces; 0 is emission and direct light; no limit by default")
+                          ->check(CLI::Range(0, 1 << 20));
+    verb.add_option("--resolutions", options_.resolutions,
+                    "Fields to compare: voxels on the longest side of each mesh's box")
+        ->delimiter(',')
+        ->check(CLI::Range(4, sdf::kMostVoxelsAlongSide))
+        ->capture_default_str();
+    verb.add_option("--max-spp", options_.max_samples,
+                    "The ladder is 1, 2, 4, ... samples a pixel up to this")
+        ->check(CLI::Range(1, 1 << 20))
+        ->capture_default_str();
+    verb.add_option("--reference-spp", options_.reference_samples, "Samples a pixel of the reference")
+        ->check(CLI::Range(core::PathTracer::kBatchCount, 1 << 24))
+        ->capture_default_str();
+    verb.add_option("--time-budget", options_.time_budget_seconds,
+                    "Seconds of rendering for the ladder, reference apart; ends it before a rung that would "
+                    "pass this; none by default")
+        ->check(CLI::PositiveNumber);
+    verb.add_option("--bake-dir", options_.bake_folder,
+                    "Where baked fields are kept, a folder a resolution; default 'fields' in the output");
+
+    for (CLI::Option* option : verb.get_options()) {
+        if (before.count(option)) continue;
+        option->group("Comparing a scene");
+        all_.push_back(option);
+    }
+}
+
+std::vector<std::string> CompareSceneFlags::given() const {
+    std::vector<std::string> flags;
+    for (const CLI::Option* option : all_) {
+        if (option->count() > 0) flags.push_back(option->get_name());
+    }
+    return flags;
+}
+
+CompareSceneOptions CompareSceneFlags::understand(const std::string& scene) const {
+    CompareSceneOptions options = options_;
+    options.scene.file = scene;
+    const auto fail = [](const std::string& message) {
+        throw core::InputError(core::ErrorKind::kUsage, message);
+    };
+    if (options.folder.empty()) fail("compare SCENE: needs -o DIR, the folder for the report");
+    const glm::ivec2 size = parse_size(size_);
+    options.width = size.x;
+    options.height = size.y;
+    if (bounces_option_->count() > 0) options.bounces = bounces_;
+    std::sort(options.resolutions.begin(), options.resolutions.end());
+    const auto twice = std::adjacent_find(options.resolutions.begin(), options.resolutions.end());
+    if (twice != options.resolutions.end()) fail(fmt::format("--resolutions: {} is there twice", *twice));
+    return options;
+}
+
+}  // namespace cli

@@ -1,0 +1,154 @@
+#include "cli/comparison_methods.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "cli/stage_clock.h"
+#include "core/support/atomic_file.h"
+#include "core/support/error.h"
+#include "core/support/file_bytes.h"
+#include "core/support/hash.h"
+#include "sdf/transform_scale.h"
+
+namespace cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Beside the fields: what baking all of them took, which the files themselves must not depend on.
+constexpr const char* kPriceFile = "bake_seconds.json";
+constexpr std::uint64_t kMostPriceBytes = 4096;
+
+/// Hash of what the fields were baked from and how.
+std::string price_key(const sdf::BakeResult& baked) {
+    core::Hasher hasher;
+    hasher.add_text(FIELDLIGHT_VERSION);
+    for (const sdf::MeshBake& mesh : baked.meshes) {
+        if (!mesh.grid) continue;
+        hasher.add_text(mesh.info().source_hash);
+        hasher.add_text(mesh.info().settings_hash);
+    }
+    return hasher.hex();
+}
+
+void record_price(const fs::path& folder, const sdf::BakeResult& baked) {
+    const nlohmann::json price = {{"schema", 1}, {"fields", price_key(baked)}, {"seconds", baked.seconds}};
+    core::write_text_atomically(folder / kPriceFile, price.dump() + "\n");
+}
+
+/// What an earlier run recorded for the same fields; nothing where there is no such record.
+std::optional<double> recorded_price(const fs::path& folder, const sdf::BakeResult& baked) {
+    if (!fs::is_regular_file(folder / kPriceFile)) return std::nullopt;
+    const std::vector<std::uint8_t> bytes = core::read_file_bytes(folder / kPriceFile, kMostPriceBytes);
+    const nlohmann::json price = nlohmann::json::parse(bytes, nullptr, false);
+    if (!price.is_object() || price.value("fields", nlohmann::json()) != price_key(baked))
+        return std::nullopt;
+    const nlohmann::json seconds = price.value("seconds", nlohmann::json());
+    if (!seconds.is_number()) return std::nullopt;
+    return seconds.get<double>();
+}
+
+void set_bake_price(const fs::path& folder, const sdf::BakeResult& baked, ReportSeries& series) {
+    const auto is_reused = [](const sdf::MeshBake& mesh) { return mesh.reused; };
+    series.bake_seconds = baked.seconds;
+    if (std::none_of(baked.meshes.begin(), baked.meshes.end(), is_reused)) {
+        record_price(folder, baked);
+        return;
+    }
+    series.bake_reused = true;
+    if (!std::all_of(baked.meshes.begin(), baked.meshes.end(), is_reused)) return;
+    if (const std::optional<double> seconds = recorded_price(folder, baked)) {
+        series.bake_seconds = *seconds;
+        series.bake_reused = false;
+        series.bake_recorded = true;
+    }
+}
+
+double median_voxel(const core::Scene& scene, const std::vector<double>& voxel_of_mesh) {
+    std::vector<double> voxels;
+    for (const core::Instance& instance : scene.instances) {
+        const double voxel = voxel_of_mesh[instance.mesh];
+        if (voxel > 0.0) {
+            voxels.push_back(voxel * sdf::largest_singular_value(glm::dmat3(instance.world_from_local)));
+        }
+    }
+    if (voxels.empty()) return 0.0;
+    const auto middle = voxels.begin() + static_cast<std::ptrdiff_t>(voxels.size() / 2);
+    std::nth_element(voxels.begin(), middle, voxels.end());
+    return *middle;
+}
+
+RenderOptions render_options(const CompareSceneOptions& options, TracerKind kind) {
+    RenderOptions render;
+    render.scene = options.scene;
+    render.tracer = render.primary = kind;
+    render.width = options.width;
+    render.height = options.height;
+    render.bounces = options.bounces;
+    return render;
+}
+
+Method triangles(const CompareSceneOptions& options, const core::Scene& scene) {
+    Method method;
+    method.render = render_options(options, TracerKind::kTriangle);
+    StageClock clock;
+    method.tracers.triangle = std::make_unique<core::TriangleTracer>(scene);
+    method.series.build_seconds = clock.lap();
+    method.series.method = "triangles";
+    method.series.bytes = method.tracers.triangle->bytes();
+    return method;
+}
+
+Method fields(const Program& program, const CompareSceneOptions& options, const core::Scene& scene,
+              int resolution, std::vector<std::string>& warnings) {
+    Method method;
+    method.render = render_options(options, TracerKind::kSdf);
+    method.render.bake.resolution = resolution;
+    const fs::path folder = options.bake_folder.empty() ? options.folder / "fields" : options.bake_folder;
+    method.render.bake_folder = folder / std::to_string(resolution);
+    method.series.method = fmt::format("fields {}", resolution);
+    method.series.resolution = resolution;
+
+    const sdf::BakeResult baked = bake_fields(program, scene, method.render.bake, method.render.bake_folder);
+    set_bake_price(method.render.bake_folder, baked, method.series);
+    for (const std::string& missing : missing_meshes(baked)) {
+        warnings.push_back(fmt::format("{}: {}", method.series.method, missing));
+    }
+    StageClock clock;
+    const auto grids = sdf::grids_by_mesh(scene, baked);
+    method.tracers.sdf = std::make_unique<sdf::SdfTracer>(scene, grids);
+    method.series.build_seconds = clock.lap();
+    for (const auto& grid : grids) method.voxel_of_mesh.push_back(grid ? grid->voxel_size() : 0.0);
+    method.series.median_voxel = median_voxel(scene, method.voxel_of_mesh);
+    method.series.bytes = method.tracers.sdf->bytes();
+    return method;
+}
+
+}  // namespace
+
+std::string Method::file_stem() const {
+    std::string stem = series.method;
+    std::replace(stem.begin(), stem.end(), ' ', '_');
+    return stem;
+}
+
+std::vector<Method> prepare_methods(const Program& program, const CompareSceneOptions& options,
+                                    const core::Scene& scene, double load_seconds,
+                                    std::vector<std::string>& warnings) {
+    std::vector<Method> methods;
+    methods.push_back(triangles(options, scene));
+    for (const int resolution : options.resolutions) {
+        methods.push_back(fields(program, options, scene, resolution, warnings));
+    }
+    for (Method& method : methods) {
+        method.series.tracer = name_of(method.render.tracer);
+        method.series.load_seconds = load_seconds;
+    }
+    return methods;
+}
+
+}  // namespace cli

@@ -1,0 +1,71 @@
+#include "cli/render_line.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+
+namespace cli {
+
+namespace {
+
+std::string quoted(const std::string& argument) {
+    const bool plain =
+        !argument.empty() && std::all_of(argument.begin(), argument.end(), [](unsigned char letter) {
+            return std::isalnum(letter) ||
+                   std::string_view("_-./:,=+@%").find(static_cast<char>(letter)) != std::string_view::npos;
+        });
+    if (plain) return argument;
+    std::string result = "'";
+    for (const char letter : argument)
+        result += letter == '\'' ? std::string("'\\''") : std::string(1, letter);
+    return result + "'";
+}
+
+void add_scene(const SceneOptions& scene, std::vector<std::string>& line) {
+    const auto add = [&](const char* flag, const std::string& value) {
+        // One word, since a value may start with a dash.
+        if (!value.empty()) line.push_back(fmt::format("{}={}", flag, value));
+    };
+    add("--scene", scene.scene);
+    add("--sky", scene.sky);
+    if (scene.sky_rotation_degrees != 0.0)
+        add("--sky-rotation", fmt::format("{}", scene.sky_rotation_degrees));
+    add("--sun", scene.sun);
+    add("--camera", scene.camera);
+    if (scene.eye.empty()) return;
+    add("--eye", scene.eye);
+    add("--look-at", scene.look_at);
+    add("--up", scene.up);
+    add("--fov", fmt::format("{}", scene.fov_degrees));
+}
+
+}  // namespace
+
+std::string render_line(const RenderOptions& options, bool allow_external) {
+    std::vector<std::string> line = {
+        "render",   options.scene.file.string(), "-o",        options.output.string(),
+        "--tracer", name_of(options.tracer),     "--primary", name_of(options.primary)};
+    if (options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf) {
+        line.insert(line.end(), {"--resolution", std::to_string(options.bake.resolution), "--bake-dir",
+                                 options.bake_folder.string()});
+    }
+    line.insert(line.end(), {"--size", fmt::format("{}x{}", options.width, options.height), "--spp",
+                             std::to_string(options.samples_per_pixel)});
+    if (options.bounces >= 0) line.insert(line.end(), {"--bounces", std::to_string(options.bounces)});
+    line.insert(line.end(), {"--seed", std::to_string(options.seed)});
+    add_scene(options.scene, line);
+    if (!options.aovs.empty())
+        line.insert(line.end(), {"--aov", fmt::format("{}", fmt::join(options.aovs, ","))});
+    if (allow_external) line.emplace_back("--allow-external");
+    return shell_line(line);
+}
+
+std::string shell_line(const std::vector<std::string>& arguments) {
+    std::string line = "fieldlight";
+    for (const std::string& argument : arguments) line += " " + quoted(argument);
+    return line;
+}
+
+}  // namespace cli

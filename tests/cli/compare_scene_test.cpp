@@ -1,0 +1,352 @@
+// `fieldlight compare SCENE` from outside: a small comparison of a bundled scene, and what its files say.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "core/image/error_estimate.h"
+#include "core/image/exr.h"
+#include "core/image/flip.h"
+#include "tests/support/shared_data.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+struct Outcome {
+    int exit_code = -1;
+    std::string out, err;
+};
+
+std::string text_of(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    std::ostringstream text;
+    text << stream.rdbuf();
+    return text.str();
+}
+
+/// A folder in which the program runs.
+class Workplace {
+public:
+    /// Runs a line of the shell in which `fieldlight` is the program.
+    Outcome run(const std::string& line) const {
+        const std::string command = "cd '" + folder_.path().string() + "' && fieldlight() { '" +
+                                    FIELDLIGHT_BINARY + "' \"$@\"; }; { " + line + " ; } > .out 2> .err";
+        const int status = std::system(command.c_str());
+        return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(path(".out")), text_of(path(".err"))};
+    }
+    fs::path path(const std::string& name) const { return folder_.path() / name; }
+
+private:
+    tests::TemporaryFolder folder_;
+};
+
+const std::string kScene = (tests::assets_folder() / "cornell_box.glb").string();
+const std::string kSmall = " --size 64x36 --resolutions 32,16 --max-spp 4 --reference-spp 32 --seed 5";
+
+/// What must not depend on the machine's pace or threads: all but times.
+json without_times(json report) {
+    for (const char* key :
+         {"date", "command", "equal_seconds", "verdict", "pareto", "threads", "peak_bytes"}) {
+        report.erase(key);
+    }
+    report["reference"].erase("seconds");
+    report["reference"].erase("reused");
+    for (json& series : report["series"]) {
+        for (const char* key : {"seconds", "bake_reused", "bake_recorded", "variance_seconds",
+                                "seconds_to_5_percent", "rel_mse_at_equal_time"}) {
+            series.erase(key);
+        }
+        for (json& stage : series["stages"]) stage.erase("seconds");
+        for (json& point : series["points"]) {
+            for (const char* key : {"seconds", "cpu_seconds", "pareto", "command"}) point.erase(key);
+        }
+    }
+    for (json& geometry : report["geometry"]) {
+        geometry.erase("triangle_mrays");
+        geometry.erase("field_mrays");
+    }
+    return report;
+}
+
+/// One comparison for all tests that only look.
+class CompareScene : public testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        place_ = new Workplace;
+        first_ = new Outcome(place_->run("fieldlight compare " + kScene + " -o out" + kSmall));
+        report_ = new json(json::parse(text_of(place_->path("out/report.json")), nullptr, false));
+    }
+    static void TearDownTestSuite() {
+        delete place_;
+        delete first_;
+        delete report_;
+    }
+
+    void SetUp() override {
+        ASSERT_EQ(first_->exit_code, 1) << first_->err;  // The reference is noisy, and that is said.
+        ASSERT_TRUE(report_->is_object());
+    }
+
+    static core::Image picture(const std::string& name) {
+        return core::read_exr(place_->path("out/pictures/" + name + ".exr"));
+    }
+
+    static const Workplace* place_;
+    static const Outcome* first_;
+    static const json* report_;
+};
+
+const Workplace* CompareScene::place_ = nullptr;
+const Outcome* CompareScene::first_ = nullptr;
+const json* CompareScene::report_ = nullptr;
+
+const std::vector<std::string> kMethods = {"triangles", "fields 16", "fields 32"};
+const std::vector<std::string> kStems = {"triangles", "fields_16", "fields_32"};
+
+TEST_F(CompareScene, TellsEveryMethodAtEveryRung) {
+    const json& report = *report_;
+    EXPECT_EQ(report.at("schema"), 1);
+    EXPECT_EQ(report.at("scene"), "cornell_box.glb");
+    EXPECT_EQ(report.at("width"), 64);
+    EXPECT_EQ(report.at("reference").at("reused"), false);
+    EXPECT_GT(report.at("reference").at("seconds"), 0.0);
+    for (const char* key : {"processor", "isa", "system", "compiler", "flags", "commit"}) {
+        EXPECT_FALSE(report.at("machine").at(key).get<std::string>().empty()) << key;
+    }
+    ASSERT_EQ(report.at("series").size(), kMethods.size());
+    for (std::size_t i = 0; i < kMethods.size(); ++i) {
+        const json& series = report.at("series").at(i);
+        EXPECT_EQ(series.at("method"), kMethods[i]);
+        EXPECT_GT(series.at("bytes"), 0);
+        EXPECT_EQ(series.at("settings").at("median_voxel").get<double>() > 0.0, i > 0);
+        ASSERT_EQ(series.at("points").size(), 3u);
+        for (int rung = 0; rung < 3; ++rung) {
+            const json& point = series.at("points").at(rung);
+            EXPECT_EQ(point.at("samples_per_pixel"), 1 << rung);
+            EXPECT_EQ(point.at("seed"), 5 + rung);
+            EXPECT_GT(point.at("seconds"), 0.0);
+            EXPECT_GT(point.at("cpu_seconds"), 0.0);
+            EXPECT_GT(point.at("rays"), 64 * 36 << rung);
+            EXPECT_EQ(point.at("metrics").at("nonfinite_pixels"), 0);
+            EXPECT_LE(point.at("rel_mse").at("low"), point.at("rel_mse").at("value"));
+            EXPECT_GE(point.at("rel_mse").at("high"), point.at("rel_mse").at("value"));
+        }
+        std::vector<std::string> stages;
+        for (const json& stage : series.at("stages")) stages.push_back(stage.at("name"));
+        EXPECT_EQ(stages, (std::vector<std::string>{"load", "bake", "build", "primary", "bounce", "shadow",
+                                                    "shade"}));
+    }
+    EXPECT_NE(report.at("reference").at("seed"), 5);
+    ASSERT_EQ(report.at("geometry").size(), 2u);
+    for (const json& geometry : report.at("geometry")) {
+        EXPECT_GT(geometry.at("rays"), 64 * 36);
+        EXPECT_GT(geometry.at("steps_per_ray"), 1.0);
+        EXPECT_LT(geometry.at("miss_percent"), 5.0);
+        EXPECT_LT(geometry.at("beyond_silhouettes_voxels").at("p99"), 1.0);
+        EXPECT_GT(geometry.at("field_mrays"), 0.0);
+    }
+    EXPECT_FALSE(report.at("verdict").get<std::string>().empty());
+    EXPECT_FALSE(report.at("pareto").empty());
+    const std::string csv = text_of(place_->path("out/report.csv"));
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 9);
+    EXPECT_NE(first_->out.find(report.at("verdict").get<std::string>()), std::string::npos) << first_->out;
+    EXPECT_NE(first_->err.find("the reference is noisy"), std::string::npos) << first_->err;
+}
+
+TEST_F(CompareScene, ReportsTheNumbersOfThePicturesThatItWrote) {
+    const core::Image reference = picture("reference");
+    const std::vector<glm::vec3> expected = *reference.color(), variance = *reference.color("Variance");
+    double noise = 0.0;
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        for (int c = 0; c < 3; ++c) {
+            noise += double(variance[i][c]) / (double(expected[i][c]) * expected[i][c] + 0.01);
+        }
+    }
+    noise /= 3.0 * double(expected.size());
+    // Sums in another order: 1e-9.
+    EXPECT_NEAR(report_->at("reference").at("rel_variance").get<double>(), noise, 1e-9 * noise);
+
+    for (std::size_t m = 0; m < kMethods.size(); ++m) {
+        SCOPED_TRACE(kMethods[m]);
+        const core::Image image = picture(kStems[m]);
+        const std::vector<glm::vec3> found = *image.color();
+        const json& point = report_->at("series").at(m).at("points").back();
+        const json& metrics = point.at("metrics");
+        double mse = 0.0, rel_mse = 0.0, energy = 0.0, expected_energy = 0.0;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+            for (int c = 0; c < 3; ++c) {
+                const double r = expected[i][c], difference = found[i][c] - r;
+                mse += difference * difference;
+                rel_mse += difference * difference / (r * r + 0.01);
+            }
+            const glm::dvec3 weights(0.2126, 0.7152, 0.0722);
+            energy += glm::dot(weights, glm::dvec3(found[i]));
+            expected_energy += glm::dot(weights, glm::dvec3(expected[i]));
+            const double y = glm::dot(weights, glm::dvec3(found[i])),
+                         y_expected = glm::dot(weights, glm::dvec3(expected[i]));
+            const double relative = std::abs(y - y_expected) / (y_expected + 0.01);
+            // Luminance in float, where both may nearly cancel.
+            EXPECT_NEAR((*image.find("RelativeError.Y"))[i], relative,
+                        1e-5 * (1.0 + y / (y_expected + 0.01)));
+        }
+        const double count = 3.0 * double(found.size());
+        EXPECT_NEAR(metrics.at("mse").get<double>(), mse / count, 1e-9 * mse / count);
+        EXPECT_NEAR(metrics.at("rel_mse").get<double>(), rel_mse / count, 1e-9 * rel_mse / count);
+        EXPECT_NEAR(metrics.at("energy_bias").get<double>(), 100.0 * (energy / expected_energy - 1.0), 1e-7);
+        const core::ErrorInterval corrected = core::corrected_rel_mse(image, reference);
+        EXPECT_EQ(point.at("rel_mse").at("value"), corrected.value);
+        EXPECT_EQ(point.at("rel_mse").at("high"), corrected.high);
+        const core::FlipResult flip = core::flip_hdr(found, expected, 64, 36);
+        EXPECT_EQ(metrics.at("flip"), flip.mean);
+        EXPECT_EQ(*image.find("Flip.Y"), flip.map);
+        ASSERT_EQ(image.find("Steps.Y") != nullptr, m > 0);
+        if (m == 0) continue;
+        const std::vector<float>& steps = *image.find("Steps.Y");
+        EXPECT_GT(*std::max_element(steps.begin(), steps.end()), 1.0f);
+    }
+}
+
+TEST_F(CompareScene, PrintsCommandsThatMakeTheSamePixels) {
+    std::vector<std::pair<std::string, std::string>> commands = {
+        {"reference", report_->at("reference").at("command")}};
+    for (std::size_t m = 0; m < kMethods.size(); ++m) {
+        commands.emplace_back(kStems[m], report_->at("series").at(m).at("points").back().at("command"));
+    }
+    for (const auto& [name, command] : commands) {
+        SCOPED_TRACE(command);
+        const std::size_t begin = command.find("-o ") + 3;
+        const std::string file = command.substr(begin, command.find(' ', begin) - begin);
+        const Outcome outcome = place_->run(command);
+        ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+        const core::Image again = core::read_exr(place_->path(file)), before = picture(name);
+        std::vector<std::string> channels = {"R", "G", "B", "A"};
+        if (name == "reference") channels.emplace_back("Variance.R");
+        for (const std::string& channel : channels) {
+            EXPECT_EQ(*again.find(channel), *before.find(channel)) << channel;
+        }
+    }
+}
+
+TEST_F(CompareScene, ReusesReferenceAndFieldsAndFindsTheSameOnOneThread) {
+    const Outcome second =
+        place_->run("fieldlight compare " + kScene + " -o out --threads 1 --json" + kSmall);
+    ASSERT_EQ(second.exit_code, 1) << second.err;
+    EXPECT_NE(second.err.find("of an earlier run is used"), std::string::npos) << second.err;
+    const json report = json::parse(text_of(place_->path("out/report.json")));
+    EXPECT_EQ(json::parse(second.out), report) << "--json prints the file";
+    EXPECT_EQ(report.at("reference").at("reused"), true);
+    EXPECT_EQ(report.at("threads"), 1);
+    EXPECT_EQ(without_times(report), without_times(*report_));
+    for (std::size_t m = 1; m < kMethods.size(); ++m) {
+        const json &before = report_->at("series").at(m), &now = report.at("series").at(m);
+        EXPECT_EQ(now.at("bake_recorded"), true);
+        EXPECT_EQ(now.at("bake_reused"), false);
+        EXPECT_EQ(now.at("seconds").at("bake"), before.at("seconds").at("bake"))
+            << "the price of fields is what baking them took";
+    }
+}
+
+TEST_F(CompareScene, SaysWhereItDoesNotKnowThePriceOfFields) {
+    fs::copy(place_->path("out/fields"), place_->path("kept"), fs::copy_options::recursive);
+    std::ofstream(place_->path("kept/16/bake_seconds.json")) << "{\"seconds\": 7";
+    fs::remove(place_->path("kept/32/floor_0.vdb"));
+    const Outcome outcome =
+        place_->run("fieldlight compare " + kScene + " -o priced --bake-dir kept" + kSmall);
+    const json report = json::parse(text_of(place_->path("priced/report.json")));
+    for (std::size_t m = 1; m < kMethods.size(); ++m) {
+        EXPECT_EQ(report.at("series").at(m).at("bake_reused"), true) << kMethods[m];
+        EXPECT_EQ(report.at("series").at(m).at("bake_recorded"), false) << kMethods[m];
+    }
+    EXPECT_NE(outcome.out.find("not the whole price"), std::string::npos) << outcome.out;
+    EXPECT_EQ(without_times(report), without_times(*report_)) << "at any thread count, in another folder";
+}
+
+TEST_F(CompareScene, RendersADamagedReferenceAgain) {
+    fs::copy(place_->path("out"), place_->path("damaged"), fs::copy_options::recursive);
+    std::vector<fs::path> kept;
+    for (const auto& entry : fs::directory_iterator(place_->path("damaged/reference"))) kept.push_back(entry);
+    ASSERT_EQ(kept.size(), 1u);
+    const std::string whole = text_of(kept[0]);
+    std::string flipped = whole;
+    flipped[flipped.size() * 2 / 3] ^= 0x10;
+    for (const std::string& bad :
+         {flipped, whole.substr(0, whole.size() / 2), std::string("not a picture")}) {
+        std::ofstream(kept[0], std::ios::binary) << bad;
+        const Outcome outcome = place_->run("fieldlight compare " + kScene + " -o damaged" + kSmall);
+        EXPECT_NE(outcome.err.find("rendered again"), std::string::npos) << outcome.err;
+        EXPECT_EQ(text_of(kept[0]), whole);
+        const json report = json::parse(text_of(place_->path("damaged/report.json")));
+        EXPECT_EQ(report.at("reference").at("reused"), false);
+        EXPECT_EQ(without_times(report), without_times(*report_));
+    }
+}
+
+TEST_F(CompareScene, KeepsAReferenceForEachPicture) {
+    const Outcome outcome =
+        place_->run("cp -r out other && fieldlight compare " + kScene +
+                    " -o other --size 32x18 --resolutions 16 --max-spp 1 --reference-spp 8 --bounces 1");
+    EXPECT_EQ(json::parse(text_of(place_->path("other/report.json"))).at("reference").at("reused"), false)
+        << outcome.err;
+    EXPECT_EQ(std::distance(fs::directory_iterator(place_->path("other/reference")), {}), 2);
+}
+
+TEST_F(CompareScene, EndsTheLadderWithItsBudget) {
+    const Outcome outcome = place_->run("fieldlight compare " + kScene +
+                                        " -o short --bake-dir out/fields --time-budget 1e-6" + kSmall);
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+    const json report = json::parse(text_of(place_->path("short/report.json")));
+    for (const json& series : report.at("series")) EXPECT_EQ(series.at("points").size(), 1u);
+    EXPECT_NE(outcome.err.find("--time-budget"), std::string::npos) << outcome.err;
+}
+
+TEST(CompareSceneErrors, EndWithTheCodeOfTheTrouble) {
+    const Workplace place;
+    std::ofstream(place.path("bad.glb")) << "not a scene";
+    std::ofstream(place.path("file")) << "in the way";
+    const auto code = [&](const std::string& arguments) {
+        const Outcome outcome = place.run("fieldlight compare " + arguments);
+        EXPECT_FALSE(outcome.err.empty()) << arguments;
+        return outcome.exit_code;
+    };
+    EXPECT_EQ(code("none.glb -o out" + kSmall), 66);
+    EXPECT_EQ(code("bad.glb -o out" + kSmall), 65);
+    EXPECT_EQ(code(kScene + " -o file/out" + kSmall), 73);
+    EXPECT_EQ(code(kScene + " -o file" + kSmall), 73);
+    EXPECT_EQ(code(kScene + kSmall), 64);
+    EXPECT_EQ(code(kScene + " " + kScene + " -o out"), 64);
+    for (const char* wrong : {"--resolutions 16,16", "--resolutions 2", "--max-spp 0", "--reference-spp 7",
+                              "--size 0x9", "--camera nobody", "--layer Direct", "--fail-mse 1",
+                              "--flip-map x.png", "--sun 1,2", "--time-budget 0"}) {
+        EXPECT_EQ(code(kScene + " -o out " + wrong), 64) << wrong;
+    }
+    for (const char* wrong : {"--size 8x8", "--sky 1,1,1", "--max-spp 4", "-o out"}) {
+        EXPECT_EQ(code(std::string("a.exr b.exr ") + wrong), 64) << wrong;
+    }
+    EXPECT_FALSE(fs::exists(place.path("out"))) << "a failed run leaves nothing";
+}
+
+TEST(CompareSceneErrors, LeaveNothingHalfWhenInterrupted) {
+    const Workplace place;
+    const Outcome outcome =
+        place.run("timeout --preserve-status -s INT 2 '" FIELDLIGHT_BINARY "' compare " + kScene +
+                  " -o out --size 640x360 --resolutions 16 --reference-spp 65536");
+    EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+    if (!fs::exists(place.path("out"))) return;  // On a slow machine the scene was not even loaded.
+    for (const auto& entry : fs::recursive_directory_iterator(place.path("out"))) {
+        if (!entry.is_regular_file()) continue;
+        const std::string name = entry.path().filename().string();
+        EXPECT_TRUE(name.ends_with(".vdb") || name == "bake_seconds.json") << name;
+    }
+}
+
+}  // namespace
