@@ -250,9 +250,10 @@ void compare_scene(Program& program, const CompareSceneOptions& options) {
         report_json(report).dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
     core::write_text_atomically(options.folder / "report.json", json + "\n");
     core::write_text_atomically(options.folder / "report.csv", report_csv(report));
+    core::write_text_atomically(options.folder / "report.html", report_html(report));
     for (const std::string& warning : report.warnings) warn(program, warning);
     std::fputs(program.common.json ? (json + "\n").c_str() : report_text(report).c_str(), stdout);
-    note(program, fmt::format("'{}': the report", (options.folder / "report.json").string()));
+    note(program, fmt::format("'{}': the report", (options.folder / "report.html").string()));
     if (!report.warnings.empty()) program.exit_code = kExitWarned;
 }
 

@@ -159,6 +159,9 @@ TEST_F(CompareScene, TellsEveryMethodAtEveryRung) {
     EXPECT_FALSE(report.at("pareto").empty());
     const std::string csv = text_of(place_->path("out/report.csv"));
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 9);
+    const std::string page = text_of(place_->path("out/report.html"));
+    EXPECT_NE(page.find("</html>"), std::string::npos);
+    for (const std::string& method : kMethods) EXPECT_NE(page.find(method), std::string::npos) << method;
     EXPECT_NE(first_->out.find(report.at("verdict").get<std::string>()), std::string::npos) << first_->out;
     EXPECT_NE(first_->err.find("the reference is noisy"), std::string::npos) << first_->err;
 }
