@@ -89,6 +89,11 @@ float srgb_from_linear(float linear) {
     return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
 }
 
+float linear_from_srgb(double encoded) {
+    return static_cast<float>(encoded <= 0.04045 ? encoded / 12.92
+                                                 : std::pow((encoded + 0.055) / 1.055, 2.4));
+}
+
 std::vector<std::uint8_t> display_picture(std::span<const glm::vec3> radiance, float ev, ToneMap tone_map) {
     const float scale = exposure_scale(ev);
     std::vector<std::uint8_t> bytes;

@@ -43,6 +43,9 @@ glm::vec3 tone_curve(ToneMap tone_map, const glm::vec3& color);
 /// The sRGB transfer function of IEC 61966-2-1. @pre linear in [0, 1]
 float srgb_from_linear(float linear);
 
+/// Its inverse. @pre encoded in [0, 1]
+float linear_from_srgb(double encoded);
+
 /// 8-bit sRGB of every pixel, 3 bytes each. Pixels with a NaN or an infinity come out magenta (255, 0, 255),
 /// so that they are seen.
 std::vector<std::uint8_t> display_picture(std::span<const glm::vec3> radiance, float ev, ToneMap tone_map);

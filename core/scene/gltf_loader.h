@@ -5,19 +5,11 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
-#include <string>
 
+#include "core/scene/load_options.h"
 #include "core/scene/scene.h"
 
 namespace core {
-
-struct LoadOptions {
-    /// Name or number of the glTF scene; empty: the file's `scene`, or scene 0.
-    std::string scene;
-    /// Lets URIs leave the file's folder.
-    bool allow_external = false;
-};
 
 /// Reads a .gltf or .glb. Points and lines are skipped with a warning; skins are ignored with a warning.
 /// Meshes whose primitives use the same accessors become one Mesh with many instances.

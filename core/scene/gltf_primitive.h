@@ -4,12 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "core/scene/gltf_document.h"
+#include "core/scene/primitive_geometry.h"
 
 namespace core {
 
@@ -34,16 +34,6 @@ struct PrimitiveSource {
     std::size_t color = kNoAccessor;
     std::vector<MorphTarget> targets;
     auto operator<=>(const PrimitiveSource&) const = default;
-};
-
-/// Triangles and their vertices. Arrays are as long as `positions` or empty.
-struct PrimitiveGeometry {
-    std::vector<glm::vec3> positions;
-    std::vector<glm::vec3> normals;  ///< Never empty; unit.
-    std::vector<glm::vec4> tangents;
-    std::array<std::vector<glm::vec2>, 2> uvs;
-    std::vector<glm::vec4> colors;
-    std::vector<glm::uvec3> triangles;
 };
 
 /// Reads the accessor indices of a primitive that draws triangles.

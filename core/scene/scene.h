@@ -1,6 +1,6 @@
 // core/scene/scene.h: everything a picture depends on, as plain data.
 //
-// Built by core/scene/gltf_loader; read-only afterwards. World unit = glTF unit, +Y up. Matrices read
+// Built by core/scene/scene_loader; read-only afterwards. World unit = glTF unit, +Y up. Matrices read
 // out-from-in.
 #pragma once
 

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 
+#include "core/image/tonemap.h"
 #include "core/support/error.h"
 
 namespace core {
@@ -33,11 +34,7 @@ bool starts_with(std::span<const std::uint8_t> bytes, std::initializer_list<std:
 
 std::array<float, 256> make_srgb_table() {
     std::array<float, 256> table{};
-    for (int code = 0; code < 256; ++code) {
-        const double encoded = code / 255.0;
-        const double linear = encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
-        table[code] = static_cast<float>(linear);
-    }
+    for (int code = 0; code < 256; ++code) table[code] = linear_from_srgb(code / 255.0);
     return table;
 }
 
