@@ -8,7 +8,7 @@
 #include <string>
 
 #include "cli/options.h"
-#include "core/scene/gltf_loader.h"
+#include "core/scene/scene_loader.h"
 #include "core/support/error.h"
 #include "sdf/baker.h"
 
@@ -108,7 +108,7 @@ void bake(Program& program, const BakeOptions& options) {
     settings.surface_class = class_names().at(options.surface_class);
     core::LoadOptions load;
     load.allow_external = program.common.allow_external;
-    const core::Scene scene = core::load_gltf(options.scene, load);
+    const core::Scene scene = core::load_scene_file(options.scene, load);
     for (const std::string& warning : scene.warnings) warn(program, warning);
 
     const core::StopRequested stop = stop_flag();
@@ -129,7 +129,7 @@ void add_bake_command(CLI::App& app, Program& program) {
     sdf::BakeSettings& settings = options->settings;
     CLI::App& verb = *app.add_subcommand("bake", "Turn the meshes of a scene into signed distance fields");
     add_common_options(verb, program.common);
-    verb.add_option("SCENE", options->scene, "Scene to read: .gltf or .glb")->required();
+    verb.add_option("SCENE", options->scene, "Scene to read: " + core::scene_file_endings())->required();
     verb.add_option("-o,--output", options->output, "Folder for the fields, one .vdb a mesh; made if missing")
         ->required();
     CLI::Option* resolution =
@@ -156,6 +156,7 @@ void add_bake_command(CLI::App& app, Program& program) {
         "Examples:\n"
         "  fieldlight bake room.glb -o room.bake\n"
         "  fieldlight bake room.glb -o room.bake --voxel 0.02 --json\n"
+        "  fieldlight bake bunny.ply -o bunny.bake\n"
         "  fieldlight bake room.glb -o room.bake --mesh curtain --class sheet --resolution 256");
     verb.callback([&program, options] { run_verb(program, [&] { bake(program, *options); }); });
 }

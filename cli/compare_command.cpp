@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -21,6 +20,7 @@
 #include "core/image/metrics.h"
 #include "core/image/png.h"
 #include "core/image/ssim.h"
+#include "core/scene/scene_loader.h"
 #include "core/support/error.h"
 
 namespace cli {
@@ -102,13 +102,6 @@ struct CompareOptions {
     CompareSceneFlags scene;
     std::optional<double> limits[std::size(kRows)];
 };
-
-bool is_scene(const std::string& path) {
-    std::string extension = std::filesystem::path(path).extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-    return extension == ".gltf" || extension == ".glb";
-}
 
 [[noreturn]] void fail(const std::string& message) {
     throw core::InputError(core::ErrorKind::kUsage, message);
@@ -310,7 +303,7 @@ void write_flip_map(const std::string& path, const core::FlipResult& flip, int w
 }
 
 void compare(const CompareOptions& options, Program& program) {
-    if (std::any_of(options.inputs.begin(), options.inputs.end(), is_scene)) {
+    if (std::any_of(options.inputs.begin(), options.inputs.end(), core::is_scene_file)) {
         check_scene(options);
         compare_scene(program, options.scene.understand(options.inputs.front()));
         return;

@@ -11,7 +11,7 @@
 #include "cli/inspect_exr.h"
 #include "cli/inspect_vdb.h"
 #include "cli/options.h"
-#include "core/scene/gltf_loader.h"
+#include "core/scene/scene_loader.h"
 #include "core/support/error.h"
 
 namespace cli {
@@ -35,7 +35,7 @@ nlohmann::json as_json(const glm::dvec3& v) {
 }
 
 nlohmann::json inspect_scene(const std::filesystem::path& path, const core::LoadOptions& options) {
-    const core::Scene scene = core::load_gltf(path, options);
+    const core::Scene scene = core::load_scene_file(path, options);
     const core::DoubleBounds bounds = core::world_bounds(scene);
     nlohmann::json result = {{"schema", 1},
                              {"meshes", scene.meshes.size()},
@@ -93,7 +93,7 @@ void inspect(const Program& program, const InspectOptions& options) {
     const std::string extension = lower_case_extension(path);
     nlohmann::json result;
     std::string text;
-    if (extension == ".gltf" || extension == ".glb") {
+    if (core::is_scene_file(path)) {
         core::LoadOptions load;
         load.scene = options.scene;
         load.allow_external = program.common.allow_external;
@@ -106,9 +106,9 @@ void inspect(const Program& program, const InspectOptions& options) {
         result = inspect_vdb(path);
         text = describe_json(result);
     } else {
-        throw core::InputError(
-            core::ErrorKind::kUsage,
-            fmt::format("'{}': only .gltf, .glb, .exr and .vdb files can be inspected", options.file));
+        throw core::InputError(core::ErrorKind::kUsage,
+                               fmt::format("'{}': only scenes ({}), .exr and .vdb files can be inspected",
+                                           options.file, core::scene_file_endings()));
     }
     if (program.common.json)
         text = result.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
@@ -122,7 +122,7 @@ void inspect(const Program& program, const InspectOptions& options) {
 
 void add_inspect_command(CLI::App& app, Program& program) {
     CLI::App* verb = app.add_subcommand(
-        "inspect", "Tell what a .gltf, .glb, .vdb or .exr holds: counts, extents, warnings, NaNs");
+        "inspect", "Tell what a scene, a .vdb or an .exr holds: counts, extents, warnings, NaNs");
     const auto options = std::make_shared<InspectOptions>();
     verb->add_option("FILE", options->file, "A scene, a distance field or a picture")->required();
     verb->add_option("--scene", options->scene, "Which scene of a glTF file: NAME or INDEX");

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/scene/gltf_loader.h"
+#include "core/scene/scene_loader.h"
 #include "core/support/error.h"
 
 namespace cli {
@@ -110,7 +110,7 @@ glm::ivec2 parse_size(const std::string& text) {
 }
 
 void add_scene_file(CLI::App& verb, SceneOptions& options) {
-    verb.add_option("SCENE", options.file, "A .gltf or .glb file")->required();
+    verb.add_option("SCENE", options.file, "A " + core::scene_file_endings() + " file")->required();
 }
 
 void add_scene_options(CLI::App& verb, SceneOptions& options) {
@@ -139,7 +139,7 @@ void add_camera_options(CLI::App& verb, SceneOptions& options) {
 }
 
 core::Scene load_scene(const Program& program, const SceneOptions& options) {
-    core::Scene scene = core::load_gltf(options.file, {options.scene, program.common.allow_external});
+    core::Scene scene = core::load_scene_file(options.file, {options.scene, program.common.allow_external});
     for (const std::string& warning : scene.warnings) warn(program, warning);
     add_sun(options, scene);
     add_sky(program, options, scene);

@@ -99,13 +99,13 @@ Mesh GltfMeshes::build_one(const Geometry& geometry) {
     mesh.name = geometry.mesh->name;
     for (std::size_t i = 0; i < geometry.mesh->primitives.size(); ++i) {
         const Primitive& primitive = geometry.mesh->primitives[i];
-        const PrimitiveGeometry part = decode_primitive(document_, primitive.element, primitive.source,
-                                                        geometry.weights, geometry.tangent_uv_sets[i]);
+        PrimitiveGeometry part = decode_primitive(document_, primitive.element, primitive.source,
+                                                  geometry.weights, geometry.tangent_uv_sets[i]);
         if (mesh.positions.size() + part.positions.size() > std::numeric_limits<std::uint32_t>::max()) {
             primitive.element.fail(
                 "brings the mesh to more than 2^32 vertices; split it into several meshes");
         }
-        append_part(mesh, part);
+        append_part(mesh, std::move(part));
     }
     finish_mesh(mesh);
     return mesh;

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "core/scene/text_scanner.h"
 #include "core/support/error.h"
 
 namespace core {
@@ -15,14 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Messages quote URIs; a data URI may be megabytes long.
-std::string shortened(std::string_view uri) {
-    constexpr std::size_t kShown = 80;
-    return uri.size() <= kShown ? std::string(uri) : std::string(uri.substr(0, kShown)) + "...";
-}
-
+/// A data URI may be megabytes long, so it is not quoted in full.
 [[noreturn]] void refuse(const std::string& what, std::string_view uri, const std::string& reason) {
-    throw InputError(ErrorKind::kBadData, fmt::format("{}: URI '{}' {}", what, shortened(uri), reason));
+    throw InputError(ErrorKind::kBadData, fmt::format("{}: '{}' {}", what, quotable(uri), reason));
 }
 
 int hex_digit(char c) {
@@ -95,6 +91,16 @@ fs::path confined_path(const std::string& uri, const std::string& decoded, const
         refuse(what, uri, "leads out of the file's folder; it is followed only with --allow-external");
     }
     return folder / relative;
+}
+
+/// @param uri as the file has it, for messages.
+std::vector<std::uint8_t> read_path(const std::string& uri, const std::string& decoded,
+                                    const fs::path& folder, bool allow_external, const std::string& what) {
+    if (decoded.empty()) refuse(what, uri, "is empty");
+    if (decoded.find('\0') != std::string::npos) refuse(what, uri, "holds a NUL character");
+    if (allow_external) return read_whole_file(folder / decoded, what);
+    if (decoded.find('\\') != std::string::npos) refuse(what, uri, "holds a backslash; use /");
+    return read_whole_file(confined_path(uri, decoded, folder, what), what);
 }
 
 }  // namespace
@@ -174,17 +180,16 @@ std::vector<std::uint8_t> read_uri(const std::string& uri, const fs::path& folde
                    : fmt::format("has the scheme '{}'; only data: and relative paths are read", scheme));
     }
     std::string decoded = percent_decoded(uri);
-    if (decoded.empty()) refuse(what, uri, "is empty");
-    if (decoded.find('\0') != std::string::npos) refuse(what, uri, "holds a NUL character");
-    if (!allow_external) {
-        if (decoded.find('\\') != std::string::npos) refuse(what, uri, "holds a backslash; use /");
-        return read_whole_file(confined_path(uri, decoded, folder, what), what);
-    }
     if (local_file) {
         decoded.erase(0, decoded.find(':') + 1);
         if (decoded.rfind("//", 0) == 0) decoded.erase(0, 2);
     }
-    return read_whole_file(folder / decoded, what);
+    return read_path(uri, decoded, folder, allow_external, what);
+}
+
+std::vector<std::uint8_t> read_named_file(const std::string& path, const fs::path& folder,
+                                          bool allow_external, const std::string& what) {
+    return read_path(path, path, folder, allow_external, what);
 }
 
 }  // namespace core

@@ -28,4 +28,10 @@ std::optional<std::vector<std::uint8_t>> base64_decoded(std::string_view text);
 std::vector<std::uint8_t> read_uri(const std::string& uri, const std::filesystem::path& folder,
                                    bool allow_external, const std::string& what);
 
+/// The bytes of a file that another one names by its path, under the same rules.
+/// @param path as it is, without percent-encoding.
+/// @throws InputError kNoInput if it is missing, kBadData if it is refused.
+std::vector<std::uint8_t> read_named_file(const std::string& path, const std::filesystem::path& folder,
+                                          bool allow_external, const std::string& what);
+
 }  // namespace core

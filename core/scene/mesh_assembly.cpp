@@ -27,12 +27,23 @@ void fill_missing_tangents(Mesh& mesh) {
 
 }  // namespace
 
-void append_part(Mesh& mesh, const PrimitiveGeometry& part) {
+void append_part(Mesh& mesh, PrimitiveGeometry part) {
     const std::size_t before = mesh.positions.size();
     const std::size_t added = part.positions.size();
     const auto part_index = static_cast<std::uint32_t>(mesh.parts.size());
     mesh.parts.push_back({static_cast<std::uint32_t>(mesh.triangles.size()),
                           static_cast<std::uint32_t>(part.triangles.size())});
+    if (before == 0) {
+        // Most meshes have one part, and need not be copied.
+        mesh.positions = std::move(part.positions);
+        mesh.normals = std::move(part.normals);
+        mesh.tangents = std::move(part.tangents);
+        mesh.uvs = std::move(part.uvs);
+        mesh.colors = std::move(part.colors);
+        mesh.triangles = std::move(part.triangles);
+        mesh.part_of_triangle.assign(mesh.triangles.size(), part_index);
+        return;
+    }
     mesh.positions.insert(mesh.positions.end(), part.positions.begin(), part.positions.end());
     mesh.normals.insert(mesh.normals.end(), part.normals.begin(), part.normals.end());
     append(mesh.tangents, part.tangents, before, added, glm::vec4(0.0f));

@@ -11,7 +11,7 @@ namespace core {
 
 /// Adds a primitive to a mesh as its next part. Attributes that only some parts have are filled up: texture
 /// coordinates with 0, colours with 1. @pre the mesh stays under 2^32 vertices
-void append_part(Mesh& mesh, const PrimitiveGeometry& part);
+void append_part(Mesh& mesh, PrimitiveGeometry part);
 
 /// Completes a mesh after its last part: tangents that some parts lack, and the bounds.
 void finish_mesh(Mesh& mesh);

@@ -28,6 +28,10 @@ bool starts_with(std::span<const std::uint8_t> bytes, std::initializer_list<std:
     return bytes.size() >= prefix.size() && std::equal(prefix.begin(), prefix.end(), bytes.begin());
 }
 
+bool is_png(std::span<const std::uint8_t> bytes) {
+    return starts_with(bytes, {0x89, 'P', 'N', 'G'});
+}
+
 [[noreturn]] void refuse(const std::string& name, const std::string& reason) {
     throw InputError(ErrorKind::kBadData, fmt::format("image '{}': {}", name, reason));
 }
@@ -85,10 +89,13 @@ glm::vec4 texel(const TextureImage& image, int x, int y, const std::array<float,
 
 }  // namespace
 
+bool is_texture_image(std::span<const std::uint8_t> encoded) {
+    return is_png(encoded) || starts_with(encoded, {0xff, 0xd8, 0xff});
+}
+
 TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const std::string& name) {
-    const bool png = starts_with(encoded, {0x89, 'P', 'N', 'G'});
-    const bool jpeg = starts_with(encoded, {0xff, 0xd8, 0xff});
-    if (!png && !jpeg) refuse(name, "is neither PNG nor JPEG, the two formats of glTF");
+    if (!is_texture_image(encoded)) refuse(name, "is neither PNG nor JPEG, the two formats of glTF");
+    const bool png = is_png(encoded);
     if (encoded.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
         refuse(name, "holds more than 2^31 bytes");
     }

@@ -28,6 +28,9 @@ struct Texture {
     bool nearest = false;  ///< Nearest texel instead of bilinear; there are no mip levels.
 };
 
+/// Whether bytes begin as PNG or JPEG do.
+bool is_texture_image(std::span<const std::uint8_t> encoded);
+
 /// Decodes a PNG or JPEG held in memory. `name` is used in messages.
 /// @throws InputError (kBadData) for anything stb cannot read, and for more than 2^28 texels.
 TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const std::string& name);

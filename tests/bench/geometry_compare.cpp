@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/scene/gltf_loader.h"
+#include "core/scene/scene_loader.h"
 #include "core/support/error.h"
 #include "core/trace/tracer_difference.h"
 #include "core/trace/triangle_tracer.h"
@@ -118,7 +118,7 @@ Options parse(int count, char** arguments) {
 }
 
 void run(const Options& options) {
-    const core::Scene scene = core::load_gltf(options.scene);
+    const core::Scene scene = core::load_scene_file(options.scene);
     sdf::BakeSettings settings;
     settings.resolution = static_cast<int>(options.resolution);
     const sdf::BakeResult bakes = sdf::bake_scene(scene, settings, options.cache);
