@@ -8,7 +8,7 @@ namespace core {
 struct LoadOptions {
     /// Name or number of the glTF scene; empty: the file's `scene`, or scene 0.
     std::string scene;
-    /// Lets URIs leave the file's folder.
+    /// Lets URIs and paths in the file leave its folder.
     bool allow_external = false;
 };
 

@@ -51,7 +51,6 @@ void append_part(Mesh& mesh, PrimitiveGeometry part) {
         append(mesh.uvs[set], part.uvs[set], before, added, glm::vec2(0.0f));
     }
     append(mesh.colors, part.colors, before, added, glm::vec4(1.0f));
-    mesh.triangles.reserve(mesh.triangles.size() + part.triangles.size());
     for (const glm::uvec3& triangle : part.triangles) {
         mesh.triangles.push_back(triangle + static_cast<std::uint32_t>(before));
     }

@@ -15,8 +15,12 @@ namespace core {
 
 namespace {
 
-/// Each is looked for on disk.
+/// Each is looked for on disk, which takes time even where there is none.
 constexpr std::size_t kMostLibraryNames = 1000;
+constexpr std::size_t kMostPictures = 10'000;
+
+/// A longer line can only be several names.
+constexpr std::size_t kLongestFileName = 255;
 
 /// The bytes of a file, or nothing if there is none.
 std::optional<std::vector<std::uint8_t>> read_if_there(const std::string& name,
@@ -58,9 +62,9 @@ void ObjMaterials::read_libraries(std::string_view names, std::size_t line) {
                          fmt::format("'{}': line {}: names more than {} material libraries", file_name_, line,
                                      kMostLibraryNames));
     }
-    if (try_library(all, line)) return;
+    if (all.size() <= kLongestFileName && try_library(all, line)) return;
     for (const std::string& part : parts) {
-        if (parts.size() > 1 && try_library(part, line)) continue;
+        if ((parts.size() > 1 || all.size() > kLongestFileName) && try_library(part, line)) continue;
         warnings_.add(
             fmt::format("line {}: material library '{}' does not exist; its materials are plain grey", line,
                         quotable(part)));
@@ -138,6 +142,10 @@ int ObjMaterials::image_of(const MtlTexture& texture, const Source& source) {
     const auto [entry, is_new] = image_of_path_.try_emplace(key, -1);
     if (!is_new) return entry->second;
     const std::string what = fmt::format("'{}': line {}: texture", source.file_name, texture.line);
+    if (image_of_path_.size() > kMostPictures) {
+        throw InputError(ErrorKind::kBadData, fmt::format("{} '{}' is one of more than {}; fewer are read",
+                                                          what, quotable(texture.file), kMostPictures));
+    }
     const auto bytes = read_if_there(texture.file, source.folder, allow_external_, what);
     if (!bytes || !is_texture_image(*bytes)) {
         warnings_.add(fmt::format("{} '{}' {}; the colour beside it stands alone", what,

@@ -8,10 +8,10 @@ namespace core {
 
 namespace {
 
-/// Corners that are looked at while ears are searched: what any file may ask for (about a second), and what
-/// each of its bytes adds.
-constexpr std::uint64_t kStepAllowance = std::uint64_t{1} << 27;
-constexpr std::uint64_t kStepsPerByte = 32;
+/// Corners that are looked at while ears are searched: what any file may ask for (a fraction of a second),
+/// and what each of its bytes adds.
+constexpr std::uint64_t kStepAllowance = std::uint64_t{1} << 26;
+constexpr std::uint64_t kStepsPerByte = 16;
 
 /// Memory for geometry: the same for small files, and what each byte adds. Real files need at most some
 /// twenty times their size.

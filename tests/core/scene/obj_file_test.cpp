@@ -323,6 +323,12 @@ TEST_F(ObjFile, WarningsComeToAnEnd) {
     std::string libraries = "mtllib";
     for (int i = 0; i < 1001; ++i) libraries += fmt::format(" {}.mtl", i);
     EXPECT_NE(error(libraries + "\n" + text).find("more than 1000 material libraries"), std::string::npos);
+    const std::string several =
+        "mtllib " + std::string(300, 'x') + " thing.mtl\nusemtl m\n" + kTriangle + "f 1 2 3\n";
+    EXPECT_NE(error(several).find("File name too long"), std::string::npos) << error(several);
+    std::string names = "mtllib";
+    for (int i = 0; i < 40; ++i) names += fmt::format(" library{}.mtl", i);
+    EXPECT_EQ(read(names + " thing.mtl\nusemtl m\n" + kTriangle + "f 1 2 3\n").materials.at(0).name, "m");
 }
 
 }  // namespace
