@@ -137,7 +137,7 @@ std::string summary_table(const Report& report) {
     };
     std::vector<std::vector<Cell>> rows;
     std::vector<std::optional<Estimate>> times, errors, floors, variances;
-    bool reused = false;
+    bool reused = false, recorded = false;
     for (std::size_t i = 0; i < report.series.size(); ++i) {
         const ReportSeries& series = report.series[i];
         times.push_back(series.seconds_to_5_percent);
@@ -150,6 +150,9 @@ std::string summary_table(const Report& report) {
         if (series.bake_reused) {
             bake.value += "†";
             reused = true;
+        } else if (series.bake_recorded) {
+            bake.value += "‡";
+            recorded = true;
         }
         rows.push_back({method_cell(report, i), time_to_target(series), fitted(errors.back()),
                         fitted(floors.back()), fitted(series.variance_seconds),
@@ -167,6 +170,7 @@ std::string summary_table(const Report& report) {
         "overlap "
         "nothing is bold. Grey: does not count.";
     if (reused) caption += " † Some fields came from an earlier run: the whole price is higher.";
+    if (recorded) caption += " ‡ The fields came from an earlier run, which recorded their price.";
     return table(caption, columns, rows);
 }
 
@@ -180,7 +184,9 @@ std::string geometry_table(const Report& report) {
         either.push_back({.value = grouped(geometry.either)});
     }
     columns.push_back({"Definition", "", "", true});
-    rays.push_back({.value = "the same for both tracers", .wrap = true});
+    const std::string same = "the same for both tracers";
+    rays.push_back(
+        {.value = report.geometry_rays.empty() ? same : same + ": " + report.geometry_rays, .wrap = true});
     either.push_back({.value = "what the percentages below are of, unless they say otherwise", .wrap = true});
     std::vector<std::vector<Cell>> rows = {rays, either};
     for (const Measure& measure : kMeasures) {

@@ -132,8 +132,9 @@ std::string verdict_of(const Report& report) {
     }
     const ReportSeries& second = *judged[1];
     return fmt::format(
-        "At equal time ({:.3g} s of rendering) {} has the least error: relMSE {} against {} of {}, the next "
-        "best; {}.",
+        "At equal time ({:.3g} s of rendering) the least error is that of {}: relMSE {} against {} of {}, "
+        "the "
+        "next best; {}.",
         report.equal_seconds, judged.front()->method, text_of(best), text_of(*second.rel_mse_at_equal_time),
         second.method, floor);
 }

@@ -250,6 +250,9 @@ TEST_F(CompareScene, ReusesReferenceAndFieldsAndFindsTheSameOnOneThread) {
     EXPECT_EQ(report.at("reference").at("reused"), true);
     EXPECT_EQ(report.at("threads"), 1);
     EXPECT_EQ(without_times(report), without_times(*report_));
+    const std::string page = text_of(place_->path("out/report.html"));
+    EXPECT_NE(page.find("which recorded their price"), std::string::npos);
+    EXPECT_NE(page.find(report.at("geometry_rays").get<std::string>()), std::string::npos);
     for (std::size_t m = 1; m < kMethods.size(); ++m) {
         const json &before = report_->at("series").at(m), &now = report.at("series").at(m);
         EXPECT_EQ(now.at("bake_recorded"), true);

@@ -102,7 +102,7 @@ TEST(Verdict, NamesTheWinnerAtEqualTimeAndTheFloorOfTheFinestFields) {
     EXPECT_NEAR(triangles.seconds_to_5_percent->value, 0.01 / 0.0025, 1e-6);
     EXPECT_NEAR(fine.seconds_to_5_percent->value, 0.03 / 0.0015, 1e-6);
     EXPECT_FALSE(coarse.seconds_to_5_percent) << "its floor forbids it";
-    EXPECT_TRUE(contains(report.verdict, "triangles has the least error")) << report.verdict;
+    EXPECT_TRUE(contains(report.verdict, "the least error is that of triangles")) << report.verdict;
     EXPECT_TRUE(contains(report.verdict, "fields 128, the next best")) << report.verdict;
     EXPECT_TRUE(contains(report.verdict, "no time brings fields 128 below a relMSE of 0.001"))
         << report.verdict;
