@@ -287,14 +287,38 @@ private:
         const auto count = static_cast<double>(labels_.size());
         const bool two_lines = count * 34.0 <= room;
         const double spacing = std::min(two_lines ? 34.0 : 17.0, room / std::max(count, 1.0));
-        double previous = kTop - spacing / 2.0;
-        for (PlotLabel& label : labels_) previous = label.y = std::max(label.from_y, previous + spacing);
-        double next = kBottom + spacing / 2.0;
-        for (auto label = labels_.rbegin(); label != labels_.rend(); ++label)
-            next = label->y = std::min(label->y, next - spacing);
+        spread(spacing);
         std::string svg = "<g class=\"labels\">\n";
         for (const PlotLabel& label : labels_) svg += label_text(label, two_lines);
         return svg + "</g>\n";
+    }
+
+    /// Moves labels, sorted by where their lines end, as little as possible (least squares) until neighbours
+    /// are `spacing` apart. Less i times the spacing that is isotonic regression: neighbours out of order are
+    /// pooled.
+    void spread(double spacing) {
+        struct Pool {
+            double sum = 0.0;
+            std::size_t count = 0;
+            double mean() const { return sum / static_cast<double>(count); }
+        };
+        std::vector<Pool> pools;
+        for (std::size_t i = 0; i < labels_.size(); ++i) {
+            pools.push_back({labels_[i].from_y - spacing * static_cast<double>(i), 1});
+            while (pools.size() > 1 && pools[pools.size() - 2].mean() > pools.back().mean()) {
+                const Pool last = pools.back();
+                pools.pop_back();
+                pools.back().sum += last.sum;
+                pools.back().count += last.count;
+            }
+        }
+        const double top = kTop + spacing / 2.0;
+        const double bottom = kBottom + spacing / 2.0 - spacing * static_cast<double>(labels_.size());
+        std::size_t i = 0;
+        for (const Pool& pool : pools)
+            for (std::size_t k = 0; k < pool.count; ++k, ++i)
+                labels_[i].y =
+                    std::clamp(pool.mean(), top, std::max(top, bottom)) + spacing * static_cast<double>(i);
     }
 
     std::string label_text(const PlotLabel& label, bool two_lines) const {
