@@ -40,6 +40,9 @@ const std::vector<Fence> kFences = {
     {"CLI11", "CLI/.*", "cli/.*|tests/cli/.*"},
     {"spdlog", "spdlog/.*", "cli/.*|core/support/.*"},
     {"zlib", "zlib\\.h", "cli/report_encode\\.cpp|tests/cli/.*"},
+    {"Draco", "draco/.*", "core/scene/gltf_draco\\.cpp|tests/core/scene/gltf_draco_test\\.cpp"},
+    {"meshoptimizer", "meshoptimizer\\.h",
+     "core/scene/gltf_meshopt\\.cpp|tests/core/scene/gltf_meshopt_test\\.cpp"},
     {"xxHash", "xxhash\\.h", "core/support/hash\\.cpp"},
 };
 
@@ -164,6 +167,8 @@ TEST(ArchitectureChecker, SeesEachKindOfBreach) {
     EXPECT_EQ(breaches("sdf/a.h", "#include <openvdb/openvdb.h>"), 1u) << "not in headers";
     EXPECT_EQ(breaches("core/render/a.cpp", "#include <embree3/rtcore.h>"), 1u);
     EXPECT_EQ(breaches("sdf/a.cpp", "#include <tbb/parallel_for.h>"), 1u);
+    EXPECT_EQ(breaches("core/scene/gltf_primitive.cpp", "#include <draco/mesh/mesh.h>"), 1u);
+    EXPECT_EQ(breaches("core/scene/gltf_document.cpp", "#include <meshoptimizer.h>"), 1u);
 }
 
 TEST(ArchitectureChecker, SeesEachFaultOfForm) {

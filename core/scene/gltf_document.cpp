@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cstring>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <string_view>
 #include <utility>
 
+#include "core/scene/gltf_extensions.h"
+#include "core/scene/gltf_meshopt.h"
 #include "core/scene/gltf_uri.h"
 #include "core/support/error.h"
 
@@ -26,41 +24,21 @@ constexpr std::size_t kChunkHeaderSize = 8;
 /// What decoded geometry may take: generous for real files, whose attributes grow at most some twenty-fold.
 constexpr std::uint64_t kMemoryAllowance = std::uint64_t{256} << 20;
 constexpr std::uint64_t kMemoryPerFileByte = 64;
-
-constexpr std::array<std::string_view, 8> kSupportedExtensions = {
-    "EXT_mesh_gpu_instancing", "KHR_lights_punctual",    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",       "KHR_materials_specular", "KHR_materials_unlit",
-    "KHR_mesh_quantization",   "KHR_texture_transform"};
-
-/// Known extensions that are left out of the picture, and what the picture loses.
-struct LostExtension {
-    std::string_view name;
-    std::string_view loss;
-};
-constexpr LostExtension kLostExtensions[] = {
-    {"EXT_meshopt_compression", "compressed buffers are not decoded; their fallbacks are used"},
-    {"EXT_texture_avif", "AVIF images are not decoded; their fallbacks are used"},
-    {"EXT_texture_webp", "WebP images are not decoded; their fallbacks are used"},
-    {"KHR_animation_pointer", "animated properties stand still"},
-    {"KHR_draco_mesh_compression", "compressed meshes are not decoded; their fallbacks are used"},
-    {"KHR_materials_anisotropy", "brushed surfaces reflect alike in all directions"},
-    {"KHR_materials_clearcoat", "clear coats are missing"},
-    {"KHR_materials_diffuse_transmission", "light does not pass through thin diffuse surfaces"},
-    {"KHR_materials_dispersion", "glass does not split colours"},
-    {"KHR_materials_iridescence", "thin-film colours are missing"},
-    {"KHR_materials_pbrSpecularGlossiness", "those materials show their metallic-roughness fallback"},
-    {"KHR_materials_sheen", "the sheen of cloth is missing"},
-    {"KHR_materials_transmission", "transparent materials are opaque"},
-    {"KHR_materials_variants", "the default variant is shown"},
-    {"KHR_materials_volume", "absorption and refraction within volumes are missing"},
-    {"KHR_node_visibility", "hidden nodes are shown"},
-    {"KHR_texture_basisu", "Basis Universal images are not decoded; their fallbacks are used"},
-};
+/// Draco brings a vertex with its two triangles down to some three bytes, which take 450 while they are read.
+constexpr std::uint64_t kMemoryPerDracoFileByte = 256;
 
 std::uint32_t read_u32(std::span<const std::uint8_t> bytes, std::size_t offset) {
     return static_cast<std::uint32_t>(bytes[offset]) | static_cast<std::uint32_t>(bytes[offset + 1]) << 8 |
            static_cast<std::uint32_t>(bytes[offset + 2]) << 16 |
            static_cast<std::uint32_t>(bytes[offset + 3]) << 24;
+}
+
+constexpr const char* kMeshopt = "EXT_meshopt_compression";
+
+/// Whether a buffer only stands for the decoded bytes of compressed views, so that it is never read.
+bool is_fallback(const JsonElement& buffer) {
+    const auto extension = buffer.extension(kMeshopt);
+    return extension && extension->boolean_or("fallback", false);
 }
 
 }  // namespace
@@ -72,11 +50,14 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, bool allow_externa
     const std::string text = read_json_text(file);
     json_ = std::make_unique<nlohmann::json>(parse_limited_json(text, file_name_));
     check_asset();
-    check_extensions();
+    for (const std::string& warning : check_extensions(root())) warn_once(warning);
     load_buffers(std::move(binary_chunk_));
     std::uint64_t byte_count = file_size;
     for (const auto& buffer : buffers_) byte_count += buffer.size();
-    memory_limit_ = kMemoryAllowance + kMemoryPerFileByte * byte_count;
+    memory_per_file_byte_ =
+        lists_extension(root(), "KHR_draco_mesh_compression") ? kMemoryPerDracoFileByte : kMemoryPerFileByte;
+    memory_limit_ = kMemoryAllowance + memory_per_file_byte_ * byte_count;
+    decode_compressed_views();
 }
 
 GltfDocument::~GltfDocument() = default;
@@ -150,47 +131,27 @@ void GltfDocument::check_asset() const {
     }
 }
 
-void GltfDocument::check_extensions() {
-    const auto supported = [](const std::string& name) {
-        return std::find(kSupportedExtensions.begin(), kSupportedExtensions.end(), name) !=
-               kSupportedExtensions.end();
-    };
-    if (const auto required = root().find("extensionsRequired")) {
-        for (std::size_t i = 0; i < required->size(); ++i) {
-            const std::string name = required->at(i).text();
-            if (!supported(name)) {
-                required->at(i).fail(fmt::format(
-                    "the file cannot be read without {}, which is not supported; export it without", name));
-            }
-        }
-    }
-    if (const auto used = root().find("extensionsUsed")) {
-        for (std::size_t i = 0; i < used->size(); ++i) {
-            const std::string name = used->at(i).text();
-            if (supported(name)) continue;
-            const auto* lost =
-                std::find_if(std::begin(kLostExtensions), std::end(kLostExtensions),
-                             [&](const LostExtension& extension) { return extension.name == name; });
-            warn_once(
-                fmt::format("{} is ignored: {}", name,
-                            lost != std::end(kLostExtensions) ? lost->loss : "whatever it adds is missing"));
-        }
-    }
-}
-
 void GltfDocument::load_buffers(std::optional<std::vector<std::uint8_t>> binary_chunk) {
     for (std::size_t i = 0; i < count("buffers"); ++i) {
         const JsonElement buffer = element("buffers", i);
         const std::uint64_t byte_length = buffer.require("byteLength").unsigned_integer();
+        if (byte_length == 0) buffer.fail("byteLength must be at least 1");
         std::vector<std::uint8_t> bytes;
+        if (is_fallback(buffer)) {
+            buffers_.emplace_back();
+            continue;
+        }
         if (const auto uri = buffer.find("uri")) {
             bytes = read_uri(uri->text(), path_.parent_path(), allow_external_, buffer.where());
         } else if (i == 0 && binary_chunk) {
             bytes = *std::move(binary_chunk);
+        } else if (lists_extension(root(), kMeshopt)) {
+            // Fallbacks need not be marked.
+            buffers_.emplace_back();
+            continue;
         } else {
             buffer.fail("has no uri, and only the first buffer of a GLB may be its binary chunk");
         }
-        if (byte_length == 0) buffer.fail("byteLength must be at least 1");
         if (byte_length > bytes.size()) {
             buffer.fail(
                 fmt::format("byteLength is {}, but the data ends after {} bytes", byte_length, bytes.size()));
@@ -200,22 +161,44 @@ void GltfDocument::load_buffers(std::optional<std::vector<std::uint8_t>> binary_
     }
 }
 
+void GltfDocument::decode_compressed_views() {
+    for (std::size_t i = 0; i < count("bufferViews"); ++i) {
+        const JsonElement view = element("bufferViews", i);
+        const auto extension = view.extension(kMeshopt);
+        if (!extension) continue;
+        const MeshoptLayout layout = read_meshopt_layout(view, *extension);
+        charge_memory(layout.count, layout.stride, *extension);
+        decoded_views_.emplace(i, decode_meshopt(layout, buffer_range(*extension), *extension));
+    }
+}
+
+/// The bytes that an object with buffer, byteOffset and byteLength refers to.
+std::span<const std::uint8_t> GltfDocument::buffer_range(const JsonElement& object) const {
+    const std::size_t index = object.require("buffer").index(buffers_.size(), "buffers");
+    const std::vector<std::uint8_t>& buffer = buffers_[index];
+    const std::uint64_t offset = object.unsigned_or("byteOffset", 0);
+    const std::uint64_t length = object.require("byteLength").unsigned_integer();
+    if (length == 0) object.fail("byteLength must be at least 1");
+    if (buffer.empty()) {
+        object.fail(fmt::format("buffers[{}] is a placeholder without data, which only views with {} may use",
+                                index, kMeshopt));
+    }
+    if (offset > buffer.size() || length > buffer.size() - offset) {
+        object.fail(fmt::format("bytes {} to {} + {} lie outside a buffer of {} bytes", offset, offset,
+                                length, buffer.size()));
+    }
+    return std::span<const std::uint8_t>(buffer).subspan(offset, length);
+}
+
 GltfDocument::BufferView GltfDocument::buffer_view(std::size_t index) const {
     const JsonElement view = element("bufferViews", index);
-    const std::vector<std::uint8_t>& buffer =
-        buffers_[view.require("buffer").index(buffers_.size(), "buffers")];
-    const std::uint64_t offset = view.unsigned_or("byteOffset", 0);
-    const std::uint64_t length = view.require("byteLength").unsigned_integer();
     const std::uint64_t stride = view.unsigned_or("byteStride", 0);
-    if (length == 0) view.fail("byteLength must be at least 1");
-    if (offset > buffer.size() || length > buffer.size() - offset) {
-        view.fail(fmt::format("bytes {} to {} + {} lie outside a buffer of {} bytes", offset, offset, length,
-                              buffer.size()));
-    }
     if (view.has("byteStride") && (stride < 4 || stride > 252 || stride % 4 != 0)) {
         view.fail(fmt::format("byteStride is {}; it must be a multiple of 4 from 4 to 252", stride));
     }
-    return {std::span<const std::uint8_t>(buffer).subspan(offset, length), stride};
+    const auto decoded = decoded_views_.find(index);
+    if (decoded != decoded_views_.end()) return {decoded->second, stride};
+    return {buffer_range(view), stride};
 }
 
 std::vector<std::uint8_t> GltfDocument::read_image(std::size_t index) const {
@@ -242,8 +225,8 @@ void GltfDocument::charge_memory(std::size_t element_count, std::size_t bytes_ea
     if (representable) memory_charged_ += static_cast<std::uint64_t>(element_count) * bytes_each;
     if (representable && memory_charged_ <= memory_limit_) return;
     throw InputError(ErrorKind::kOutOfMemory,
-                     fmt::format("{}: the file asks for more than {} MiB of geometry, {} times its size",
-                                 element.where(), memory_limit_ >> 20, kMemoryPerFileByte));
+                     fmt::format("{}: the file asks for more than {} MiB of decoded data, {} times its size",
+                                 element.where(), memory_limit_ >> 20, memory_per_file_byte_));
 }
 
 }  // namespace core

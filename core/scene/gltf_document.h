@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -18,8 +19,8 @@ namespace core {
 /// The parsed file. Everything the other gltf_* units read goes through it.
 class GltfDocument {
 public:
-    /// Reads a .gltf or .glb (told apart by content) and all its buffers, and checks `asset`, the required
-    /// extensions and the buffer views. @throws InputError
+    /// Reads a .gltf or .glb (told apart by content) and all its buffers, decodes compressed buffer views,
+    /// and checks `asset` and the required extensions. @throws InputError
     GltfDocument(const std::filesystem::path& path, bool allow_external);
     ~GltfDocument();
     GltfDocument(const GltfDocument&) = delete;
@@ -33,7 +34,7 @@ public:
     /// @pre index < count(array)
     JsonElement element(const char* array, std::size_t index) const;
 
-    /// The bytes of a buffer view, in range of its buffer, and its stride (0: tightly packed).
+    /// The bytes of a buffer view, decoded if it is compressed, and its stride (0: tightly packed).
     struct BufferView {
         std::span<const std::uint8_t> bytes;
         std::size_t stride = 0;
@@ -54,16 +55,19 @@ public:
 private:
     std::string read_json_text(std::vector<std::uint8_t>& file);
     void check_asset() const;
-    void check_extensions();
     void load_buffers(std::optional<std::vector<std::uint8_t>> binary_chunk);
+    void decode_compressed_views();
+    std::span<const std::uint8_t> buffer_range(const JsonElement& object) const;
 
     std::filesystem::path path_;
     std::string file_name_;
     bool allow_external_;
     std::unique_ptr<nlohmann::json> json_;
     std::optional<std::vector<std::uint8_t>> binary_chunk_;
-    std::vector<std::vector<std::uint8_t>> buffers_;
+    std::vector<std::vector<std::uint8_t>> buffers_;  ///< Empty: a placeholder without data.
+    std::map<std::size_t, std::vector<std::uint8_t>> decoded_views_;
     std::vector<std::string> warnings_;
+    std::uint64_t memory_per_file_byte_ = 0;
     std::uint64_t memory_limit_ = 0;
     std::uint64_t memory_charged_ = 0;
 };

@@ -15,11 +15,9 @@ namespace {
 constexpr std::uint64_t kTriangles = 4;
 constexpr std::uint64_t kTriangleStrip = 5;
 
-/// An attribute's accessor, checked for type and length.
-GltfAccessor open_attribute(const GltfDocument& document, const JsonElement& primitive, std::size_t index,
-                            const char* name, int least_components, int most_components,
-                            std::size_t vertex_count) {
-    GltfAccessor accessor(document, index);
+/// Checks an attribute's accessor for type and length.
+void check_attribute(const GltfAccessor& accessor, const JsonElement& primitive, const char* name,
+                     int least_components, int most_components, std::size_t vertex_count) {
     if (accessor.component_count() < least_components || accessor.component_count() > most_components) {
         accessor.element().fail(fmt::format("has {} components; {} of {} needs {}",
                                             accessor.component_count(), name, primitive.path(),
@@ -29,7 +27,6 @@ GltfAccessor open_attribute(const GltfDocument& document, const JsonElement& pri
         accessor.element().fail(fmt::format("has {} elements; {} of {} needs {}, as many as POSITION",
                                             accessor.count(), name, primitive.path(), vertex_count));
     }
-    return accessor;
 }
 
 std::vector<std::uint32_t> read_indices(GltfDocument& document, const JsonElement& primitive,
@@ -78,12 +75,14 @@ std::vector<glm::uvec3> make_triangles(std::uint64_t mode, const std::vector<std
 /// Reads the attributes of the used vertices.
 class VertexReader {
 public:
+    /// @param draco the decoded mesh if the primitive is compressed, else null.
     VertexReader(GltfDocument& document, const JsonElement& primitive, const PrimitiveSource& source,
-                 const std::vector<double>& weights, std::size_t vertex_count)
+                 const std::vector<double>& weights, const DracoMesh* draco, std::size_t vertex_count)
         : document_(document),
           primitive_(primitive),
           source_(source),
           weights_(weights),
+          draco_(draco),
           vertex_count_(vertex_count) {}
 
     void read(const std::vector<std::uint32_t>& used, bool tangents, PrimitiveGeometry& geometry) const {
@@ -102,20 +101,38 @@ public:
     }
 
 private:
+    GltfAccessor open(std::size_t index, const char* name, int least_components, int most_components) const {
+        if (draco_) {
+            const auto decoded = draco_->attributes.find(name);
+            if (decoded != draco_->attributes.end()) {
+                GltfAccessor accessor(read_accessor_layout(document_, index), decoded->second);
+                check_attribute(accessor, primitive_, name, least_components, most_components, vertex_count_);
+                return accessor;
+            }
+        }
+        return open_plain(index, name, least_components, most_components);
+    }
+
+    /// Morph targets are never in the compressed data, whatever their attribute is called.
+    GltfAccessor open_plain(std::size_t index, const char* name, int least_components,
+                            int most_components) const {
+        GltfAccessor accessor(document_, index);
+        check_attribute(accessor, primitive_, name, least_components, most_components, vertex_count_);
+        return accessor;
+    }
+
     template <typename Vector>
     void read_displaced(const std::vector<std::uint32_t>& used, std::size_t base,
                         std::size_t MorphTarget::*target_accessor, const char* name, int component_count,
                         std::vector<Vector>& result) const {
-        const GltfAccessor accessor = open_attribute(document_, primitive_, base, name, component_count,
-                                                     component_count, vertex_count_);
+        const GltfAccessor accessor = open(base, name, component_count, component_count);
         result.reserve(used.size());
         for (const std::uint32_t vertex : used) result.emplace_back(accessor.read(vertex));
         for (std::size_t t = 0; t < std::min(source_.targets.size(), weights_.size()); ++t) {
             const std::size_t index = source_.targets[t].*target_accessor;
             const auto weight = static_cast<float>(weights_[t]);
             if (index == kNoAccessor || weight == 0.0f) continue;
-            const GltfAccessor displacement =
-                open_attribute(document_, primitive_, index, name, 3, 3, vertex_count_);
+            const GltfAccessor displacement = open_plain(index, name, 3, 3);
             for (std::size_t i = 0; i < used.size(); ++i) {
                 result[i] += Vector(weight * displacement.read(used[i]));
             }
@@ -134,8 +151,7 @@ private:
     void read_uvs(const std::vector<std::uint32_t>& used, std::size_t set,
                   std::vector<glm::vec2>& uvs) const {
         const std::string name = fmt::format("TEXCOORD_{}", set);
-        const GltfAccessor accessor =
-            open_attribute(document_, primitive_, source_.uvs[set], name.c_str(), 2, 2, vertex_count_);
+        const GltfAccessor accessor = open(source_.uvs[set], name.c_str(), 2, 2);
         uvs.reserve(used.size());
         bool broken = false;
         for (const std::uint32_t vertex : used) {
@@ -150,8 +166,7 @@ private:
 
     /// The specification demands colours in [0, 1].
     void read_colors(const std::vector<std::uint32_t>& used, std::vector<glm::vec4>& colors) const {
-        const GltfAccessor accessor =
-            open_attribute(document_, primitive_, source_.color, "COLOR_0", 3, 4, vertex_count_);
+        const GltfAccessor accessor = open(source_.color, "COLOR_0", 3, 4);
         if (!accessor.is_float() && !accessor.is_normalized()) {
             accessor.element().fail("COLOR_0 must be float or normalized");
         }
@@ -170,8 +185,35 @@ private:
     const JsonElement& primitive_;
     const PrimitiveSource& source_;
     const std::vector<double>& weights_;
+    const DracoMesh* draco_;
     std::size_t vertex_count_;
 };
+
+/// The primitive's compressed data, with its accessors' word for how much they may hold.
+DracoMesh decode_compressed(GltfDocument& document, const JsonElement& element,
+                            const PrimitiveSource& source) {
+    if (source.mode != kTriangles && source.mode != kTriangleStrip) {
+        element.fail("holds Draco data, which need mode TRIANGLES or TRIANGLE_STRIP");
+    }
+    if (source.indices == kNoAccessor) element.fail("holds Draco data, but no indices accessor");
+    DracoExpectation expected;
+    expected.vertex_count = read_accessor_layout(document, source.position).count;
+    expected.index_count = read_accessor_layout(document, source.indices).count;
+    // A strip has a triangle an index, past the first two.
+    if (source.mode == kTriangleStrip) expected.index_count *= 3;
+    const auto expect = [&](const char* name, std::size_t accessor) {
+        if (accessor != kNoAccessor && source.draco->attributes.contains(name)) {
+            expected.accessors.emplace(name, accessor);
+        }
+    };
+    expect("POSITION", source.position);
+    expect("NORMAL", source.normal);
+    expect("TANGENT", source.tangent);
+    expect("TEXCOORD_0", source.uvs[0]);
+    expect("TEXCOORD_1", source.uvs[1]);
+    expect("COLOR_0", source.color);
+    return decode_draco(document, element, *source.draco, expected);
+}
 
 }  // namespace
 
@@ -197,39 +239,47 @@ PrimitiveSource read_primitive_source(const GltfDocument& document, const JsonEl
                                       accessor_of(target, "TANGENT")});
         }
     }
+    if (const auto extension = primitive.extension("KHR_draco_mesh_compression")) {
+        source.draco = read_draco_source(document, *extension);
+    }
     return source;
 }
 
 PrimitiveGeometry decode_primitive(GltfDocument& document, const JsonElement& element,
                                    const PrimitiveSource& source, const std::vector<double>& weights,
                                    int tangent_uv_set) {
-    const GltfAccessor position(document, source.position);
-    if (!position.has_data() && element.extension("KHR_draco_mesh_compression")) {
-        element.fail("holds Draco data without a fallback; export it uncompressed");
-    }
-    const std::size_t vertex_count = position.count();
+    std::optional<DracoMesh> draco;
+    if (source.draco) draco = decode_compressed(document, element, source);
+    const std::size_t vertex_count =
+        draco ? draco->point_count : GltfAccessor(document, source.position).count();
     std::vector<std::uint32_t> indices;
-    if (source.indices != kNoAccessor) {
+    if (draco) {
+        document.charge_memory(draco->indices.size(), sizeof(std::uint32_t) + sizeof(glm::uvec3), element);
+        indices = std::move(draco->indices);
+    } else if (source.indices != kNoAccessor) {
         indices = read_indices(document, element, source.indices, vertex_count);
     } else {
         document.charge_memory(vertex_count, sizeof(std::uint32_t) + sizeof(glm::uvec3), element);
         indices.resize(vertex_count);
         for (std::size_t i = 0; i < vertex_count; ++i) indices[i] = static_cast<std::uint32_t>(i);
     }
-    if (source.mode == kTriangles ? indices.size() % 3 != 0 : indices.size() < 3) {
+    // Draco decodes strips to single triangles, too.
+    const std::uint64_t mode = draco ? kTriangles : source.mode;
+    if (mode == kTriangles ? indices.size() % 3 != 0 : indices.size() < 3) {
         document.warn_once(fmt::format("{}: {} vertices do not make up whole triangles; the rest is ignored",
                                        element.path(), indices.size()));
     }
 
     PrimitiveGeometry geometry;
-    geometry.triangles = make_triangles(source.mode, indices);
+    geometry.triangles = make_triangles(mode, indices);
     const std::vector<std::uint32_t> used = compact_vertices(geometry.triangles, vertex_count);
     const std::size_t stored_vertices =
         source.normal == kNoAccessor ? 3 * geometry.triangles.size() : used.size();
     document.charge_memory(stored_vertices,
                            2 * sizeof(glm::vec3) + 2 * sizeof(glm::vec2) + 2 * sizeof(glm::vec4), element);
     const bool tangents = tangent_uv_set >= 0;
-    VertexReader(document, element, source, weights, vertex_count).read(used, tangents, geometry);
+    VertexReader(document, element, source, weights, draco ? &*draco : nullptr, vertex_count)
+        .read(used, tangents, geometry);
     if (source.normal == kNoAccessor) {
         make_flat_normals(geometry);
     } else if (const std::size_t broken = mend_normals(geometry); broken > 0) {

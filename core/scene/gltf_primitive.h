@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/scene/gltf_document.h"
+#include "core/scene/gltf_draco.h"
 #include "core/scene/primitive_geometry.h"
 
 namespace core {
@@ -23,7 +25,8 @@ struct MorphTarget {
     auto operator<=>(const MorphTarget&) const = default;
 };
 
-/// Which accessors a primitive's geometry is made of. Equal sources give equal triangles.
+/// Which accessors a primitive's geometry is made of, and the compressed data that replace theirs. Equal
+/// sources give equal triangles.
 struct PrimitiveSource {
     std::uint64_t mode = 4;
     std::size_t indices = kNoAccessor;
@@ -33,6 +36,7 @@ struct PrimitiveSource {
     std::array<std::size_t, 2> uvs = {kNoAccessor, kNoAccessor};
     std::size_t color = kNoAccessor;
     std::vector<MorphTarget> targets;
+    std::optional<DracoSource> draco;
     auto operator<=>(const PrimitiveSource&) const = default;
 };
 

@@ -157,6 +157,7 @@ std::string GltfBuilder::json(const std::string& buffer_uri) const {
     std::vector<std::string> members = {R"("asset":{"version":"2.0"})"};
     for (const auto& [key, value] : members_) members.push_back(fmt::format(R"("{}":{})", key, value));
     for (const auto& [key, objects] : arrays_) {
+        if (key == "buffers") continue;
         members.push_back(fmt::format(R"("{}":[{}])", key, join(objects)));
     }
     if (!arrays_.contains("scenes")) {
@@ -172,7 +173,10 @@ std::string GltfBuilder::json(const std::string& buffer_uri) const {
                                     ? buffer_uri
                                     : "data:application/octet-stream;base64," + encode_base64(bytes_);
         const std::string member = uri == "-" ? std::string() : fmt::format(R"("uri":"{}",)", uri);
-        members.push_back(fmt::format(R"("buffers":[{{{}"byteLength":{}}}])", member, bytes_.size()));
+        std::vector<std::string> buffers = {fmt::format(R"({{{}"byteLength":{}}})", member, bytes_.size())};
+        const auto more = arrays_.find("buffers");
+        if (more != arrays_.end()) buffers.insert(buffers.end(), more->second.begin(), more->second.end());
+        members.push_back(fmt::format(R"("buffers":[{}])", join(buffers)));
     }
     return fmt::format("{{{}}}", join(members));
 }

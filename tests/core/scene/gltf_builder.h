@@ -28,7 +28,8 @@ public:
     int add_floats(const std::string& type, const std::vector<float>& values);
     int add_indices(const std::vector<std::uint16_t>& values);
 
-    /// Appends an object to a top-level array ("nodes", "meshes", ...) and returns its index.
+    /// Appends an object to a top-level array ("nodes", "meshes", ...) and returns its index there. "buffers"
+    /// come after the builder's own.
     int add(const std::string& array, const std::string& object);
     /// Sets a top-level member other than those arrays.
     void set(const std::string& key, const std::string& json) { members_[key] = json; }
