@@ -44,7 +44,7 @@ nlohmann::json inspect_scene(const std::filesystem::path& path, const core::Load
                              {"materials", scene.materials.size()},
                              {"lights", scene.lights.size()},
                              {"cameras", scene.cameras.size()},
-                             {"animations", scene.animation_count},
+                             {"animations", scene.animations.size()},
                              {"extensions", scene.extensions_used},
                              {"bounds", nullptr},
                              {"warnings", scene.warnings}};

@@ -3,12 +3,14 @@
 // As in glTF: the camera looks along its -Z with +Y up.
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
 #include <string>
 
 #include "core/math/bounds.h"
 #include "core/math/ray.h"
+#include "core/scene/node.h"
 
 namespace core {
 
@@ -20,6 +22,7 @@ struct Camera {
     glm::dvec2 magnification{1.0};  ///< Half width and half height in world units; orthographic only.
     double near_distance = 0.0;     ///< Planar; nothing closer is seen.
     double far_distance = std::numeric_limits<double>::infinity();
+    std::uint32_t node = kNoNode;  ///< Index into Scene::nodes.
 };
 
 /// Makes rays for pictures of one size. An orthographic camera keeps its half height and takes its width from

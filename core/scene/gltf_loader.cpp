@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/scene/gltf_animations.h"
 #include "core/scene/gltf_document.h"
 #include "core/scene/gltf_materials.h"
 #include "core/scene/gltf_meshes.h"
@@ -16,7 +17,6 @@ Scene load_gltf(const std::filesystem::path& path, const LoadOptions& options) {
     if (const auto used = document.root().find("extensionsUsed")) {
         for (std::size_t i = 0; i < used->size(); ++i) scene.extensions_used.push_back(used->at(i).text());
     }
-    scene.animation_count = static_cast<std::uint32_t>(document.count("animations"));
 
     GltfMaterials materials = load_materials(document);
     scene.textures = std::move(materials.textures);
@@ -25,6 +25,7 @@ Scene load_gltf(const std::filesystem::path& path, const LoadOptions& options) {
     GltfMeshes meshes(document, materials.materials);
     load_nodes(document, options.scene, meshes, scene);
     scene.meshes = meshes.build();
+    scene.animations = load_animations(document, scene.nodes);
 
     scene.materials = std::move(materials.materials);
     if (meshes.uses_default_material()) scene.materials.emplace_back().name = "default";

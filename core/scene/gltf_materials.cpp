@@ -24,15 +24,28 @@ public:
         for (std::size_t i = 0; i < document_.count("materials"); ++i) {
             result_.materials.push_back(read_material(document_.element("materials", i)));
         }
-        decode_images();
+        load_images();
         return std::move(result_);
     }
 
 private:
+    /// An image of the file, or the roughness made from its A.
+    struct ImageSource {
+        std::size_t gltf_image;
+        std::optional<float> glossiness;
+    };
+
     Material read_material(const JsonElement& element) {
         Material material;
         material.name = element.text_or("name", "");
-        if (const auto pbr = element.find("pbrMetallicRoughness")) read_metallic_roughness(*pbr, material);
+        material.unlit = element.extension("KHR_materials_unlit").has_value();
+        const auto specular_glossiness = element.extension("KHR_materials_pbrSpecularGlossiness");
+        // Where both are given this one wins, but what is unlit has its colour from the core material.
+        if (specular_glossiness && !material.unlit) {
+            read_specular_glossiness(*specular_glossiness, material);
+        } else {
+            read_core_surface(element, material);
+        }
         if (const auto normal = element.find("normalTexture")) {
             material.normal_texture = read_texture_use(*normal);
             material.normal_scale = static_cast<float>(normal->number_or("scale", 1.0));
@@ -42,12 +55,15 @@ private:
         read_emission(element, material);
         read_alpha(element, material);
         material.double_sided = element.boolean_or("doubleSided", false);
-        material.unlit = element.extension("KHR_materials_unlit").has_value();
+        return material;
+    }
+
+    void read_core_surface(const JsonElement& element, Material& material) {
+        if (const auto pbr = element.find("pbrMetallicRoughness")) read_metallic_roughness(*pbr, material);
         if (const auto ior = element.extension("KHR_materials_ior")) read_ior(*ior, material);
         if (const auto specular = element.extension("KHR_materials_specular")) {
             read_specular(*specular, material);
         }
-        return material;
     }
 
     void read_metallic_roughness(const JsonElement& pbr, Material& material) {
@@ -114,6 +130,35 @@ private:
         if (const auto texture = extension.find("specularColorTexture")) {
             material.specular_color_texture = read_texture_use(*texture);
         }
+    }
+
+    /// The conversion that KHR_materials_specular publishes, which loses nothing: a dielectric whose F0 is
+    /// the specular colour, since an index of refraction of 0 makes the factor before it 1. What that coat
+    /// keeps is missing from the diffuse layer below, as the archived extension asks with 1 - max(specular).
+    void read_specular_glossiness(const JsonElement& extension, Material& material) {
+        const glm::dvec4 diffuse = extension.vec4_or("diffuseFactor", glm::dvec4(1.0));
+        for (int i = 0; i < 4; ++i) material.base_color[i] = unit(extension, "diffuseFactor", diffuse[i]);
+        if (const auto texture = extension.find("diffuseTexture")) {
+            material.base_color_texture = read_texture_use(*texture);
+        }
+        const glm::dvec3 specular = extension.vec3_or("specularFactor", glm::dvec3(1.0));
+        for (int i = 0; i < 3; ++i) {
+            material.specular_color[i] = unit(extension, "specularFactor", specular[i]);
+        }
+        material.ior = 0.0f;
+        material.metallic = 0.0f;
+        const float glossiness =
+            unit(extension, "glossinessFactor", extension.number_or("glossinessFactor", 1.0));
+        material.roughness = 1.0f - glossiness;
+        const auto texture = extension.find("specularGlossinessTexture");
+        if (!texture) return;
+        material.specular_color_texture = read_texture_use(*texture);
+        if (!material.specular_color_texture.present() || glossiness == 0.0f) return;
+        // The factor is within the texture that is made.
+        material.roughness = 1.0f;
+        material.metallic_roughness_texture = material.specular_color_texture;
+        material.metallic_roughness_texture.texture =
+            roughness_texture(material.specular_color_texture.texture, glossiness);
     }
 
     float unit(const JsonElement& element, const char* key, double value) {
@@ -191,6 +236,20 @@ private:
         return index;
     }
 
+    /// The index in the result of a texture whose G is 1 - glossiness x A of another one.
+    int roughness_texture(int texture, float glossiness) {
+        const auto next = static_cast<int>(result_.textures.size());
+        const auto [entry, is_new] = roughness_of_.try_emplace({texture, glossiness}, next);
+        if (is_new) {
+            Texture roughness = result_.textures[static_cast<std::size_t>(texture)];
+            const ImageSource source{images_[roughness.image].gltf_image, glossiness};
+            roughness.image = static_cast<std::uint32_t>(images_.size());
+            images_.push_back(source);
+            result_.textures.push_back(roughness);
+        }
+        return entry->second;
+    }
+
     static void read_sampler(const JsonElement& sampler, Texture& texture) {
         constexpr std::uint64_t kNearest = 9728;
         constexpr std::uint64_t kLinear = 9729;
@@ -218,23 +277,38 @@ private:
     }
 
     std::uint32_t used_image(std::size_t gltf_image) {
-        const auto next = static_cast<std::uint32_t>(gltf_images_.size());
+        const auto next = static_cast<std::uint32_t>(images_.size());
         const auto [entry, is_new] = image_of_gltf_.try_emplace(gltf_image, next);
-        if (is_new) gltf_images_.push_back(gltf_image);
+        if (is_new) images_.push_back({gltf_image, std::nullopt});
         return entry->second;
     }
 
-    void decode_images() {
-        result_.images.resize(gltf_images_.size());
-        std::vector<std::exception_ptr> errors(gltf_images_.size());
-        parallel_for(gltf_images_.size(), 1, [&](std::size_t begin, std::size_t end) {
+    void load_images() {
+        result_.images.resize(images_.size());
+        for_each_image([&](std::size_t i) {
+            if (!images_[i].glossiness) result_.images[i] = decode_image(images_[i].gltf_image);
+        });
+        const auto decoded_of = [&](const ImageSource& source) -> const TextureImage& {
+            return result_.images[image_of_gltf_.at(source.gltf_image)];
+        };
+        for (const ImageSource& source : images_) {
+            if (!source.glossiness) continue;
+            document_.charge_memory(decoded_of(source).rgba.size(), 1,
+                                    document_.element("images", source.gltf_image));
+        }
+        for_each_image([&](std::size_t i) {
+            if (!images_[i].glossiness) return;
+            result_.images[i] = roughness_image(decoded_of(images_[i]), *images_[i].glossiness);
+        });
+    }
+
+    template <typename Load>
+    void for_each_image(const Load& load) const {
+        std::vector<std::exception_ptr> errors(images_.size());
+        parallel_for(images_.size(), 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
                 try {
-                    const JsonElement element = document_.element("images", gltf_images_[i]);
-                    const std::vector<std::uint8_t> encoded = document_.read_image(gltf_images_[i]);
-                    result_.images[i] = decode_texture_image(
-                        encoded, fmt::format("{} {}", document_.file_name(), element.path()));
-                    result_.images[i].name = element.text_or("name", "");
+                    load(i);
                 } catch (...) {
                     errors[i] = std::current_exception();
                 }
@@ -246,11 +320,35 @@ private:
         }
     }
 
+    TextureImage decode_image(std::size_t gltf_image) const {
+        const JsonElement element = document_.element("images", gltf_image);
+        const std::vector<std::uint8_t> encoded = document_.read_image(gltf_image);
+        TextureImage image =
+            decode_texture_image(encoded, fmt::format("{} {}", document_.file_name(), element.path()));
+        image.name = element.text_or("name", "");
+        return image;
+    }
+
+    /// Glossiness is linear in A, so filtering this image is filtering that one.
+    static TextureImage roughness_image(const TextureImage& source, float glossiness) {
+        TextureImage image = source;
+        image.name += " (roughness)";
+        for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+            const auto alpha = static_cast<float>(source.rgba[i + 3]);
+            image.rgba[i] = 0;
+            image.rgba[i + 1] = static_cast<std::uint8_t>(std::lround(255.0f - glossiness * alpha));
+            image.rgba[i + 2] = 0;
+            image.rgba[i + 3] = 255;
+        }
+        return image;
+    }
+
     GltfDocument& document_;
     GltfMaterials result_;
     std::map<std::size_t, int> texture_of_gltf_;
     std::map<std::size_t, std::uint32_t> image_of_gltf_;
-    std::vector<std::size_t> gltf_images_;
+    std::map<std::pair<int, float>, int> roughness_of_;  ///< By texture and glossiness.
+    std::vector<ImageSource> images_;                    ///< What each of the result's images is made from.
 };
 
 }  // namespace

@@ -9,7 +9,8 @@
 
 namespace core {
 
-/// All materials of the file, with only the textures and images that some material uses.
+/// All materials of the file, those of KHR_materials_pbrSpecularGlossiness converted, with only the textures
+/// and images that some material uses.
 struct GltfMaterials {
     std::vector<Material> materials;
     std::vector<Texture> textures;

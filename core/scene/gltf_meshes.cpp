@@ -48,6 +48,9 @@ const GltfMeshes::GltfMesh& GltfMeshes::parsed(std::size_t gltf_mesh) {
                 fmt::format("mesh '{}' primitive {} has no POSITION and is skipped", result.name, i));
             continue;
         }
+        if (!source.targets.empty()) {
+            document_.warn_once("morph targets stand still: meshes keep the weights they have at rest");
+        }
         auto material = static_cast<std::uint32_t>(materials_.size());
         if (const auto index = primitive.find("material")) {
             material = static_cast<std::uint32_t>(index->index(materials_.size(), "materials"));

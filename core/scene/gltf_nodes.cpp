@@ -8,6 +8,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <optional>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/scene/gltf_accessors.h"
@@ -18,30 +19,17 @@ namespace core {
 
 namespace {
 
-glm::dmat4 compose(const glm::dvec3& translation, const glm::dquat& rotation, const glm::dvec3& scale) {
-    glm::dmat4 matrix = glm::mat4_cast(rotation);
-    for (int axis = 0; axis < 3; ++axis) matrix[axis] *= scale[axis];
-    matrix[3] = glm::dvec4(translation, 1.0);
-    return matrix;
-}
-
 glm::dquat unit_quaternion(const glm::dvec4& xyzw, const JsonElement& element) {
     const double length = glm::length(xyzw);
     if (!(length > 0.0) || !std::isfinite(length)) element.fail("its rotation must be a unit quaternion");
     return glm::dquat(xyzw.w / length, xyzw.x / length, xyzw.y / length, xyzw.z / length);
 }
 
-glm::dmat4 local_transform(const JsonElement& node) {
-    const auto matrix = node.find("matrix");
-    if (!matrix) {
-        return compose(node.vec3_or("translation", glm::dvec3(0.0)),
-                       unit_quaternion(node.vec4_or("rotation", glm::dvec4(0.0, 0.0, 0.0, 1.0)), node),
-                       node.vec3_or("scale", glm::dvec3(1.0)));
-    }
+glm::dmat4 read_matrix(const JsonElement& node, const JsonElement& matrix) {
     if (node.has("translation") || node.has("rotation") || node.has("scale")) {
         node.fail("has a matrix and also translation, rotation or scale; one of them must go");
     }
-    const std::vector<double> values = matrix->numbers(16);
+    const std::vector<double> values = matrix.numbers(16);
     glm::dmat4 result;
     for (int column = 0; column < 4; ++column) {
         for (int row = 0; row < 4; ++row) {
@@ -49,7 +37,7 @@ glm::dmat4 local_transform(const JsonElement& node) {
         }
     }
     if (result[0][3] != 0.0 || result[1][3] != 0.0 || result[2][3] != 0.0 || result[3][3] != 1.0) {
-        matrix->fail("its last row must be 0, 0, 0, 1");
+        matrix.fail("its last row must be 0, 0, 0, 1");
     }
     return result;
 }
@@ -96,6 +84,26 @@ Hierarchy read_hierarchy(const GltfDocument& document) {
         }
     }
     return result;
+}
+
+std::vector<Node> read_nodes(GltfDocument& document, const Hierarchy& hierarchy) {
+    const std::size_t count = document.count("nodes");
+    document.charge_memory(count, sizeof(Node) + sizeof(glm::dmat4), document.root());
+    std::vector<Node> nodes(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const JsonElement element = document.element("nodes", i);
+        Node& node = nodes[i];
+        node.name = element.text_or("name", "");
+        if (hierarchy.parent[i] != kNone) node.parent = static_cast<std::uint32_t>(hierarchy.parent[i]);
+        if (const auto matrix = element.find("matrix")) {
+            node.matrix = read_matrix(element, *matrix);
+            continue;
+        }
+        node.translation = element.vec3_or("translation", glm::dvec3(0.0));
+        node.rotation = unit_quaternion(element.vec4_or("rotation", glm::dvec4(0.0, 0.0, 0.0, 1.0)), element);
+        node.scale = element.vec3_or("scale", glm::dvec3(1.0));
+    }
+    return nodes;
 }
 
 /// The chosen entry of `scenes`, or nothing if the file has none.
@@ -154,9 +162,9 @@ std::vector<glm::dmat4> read_instancing(GltfDocument& document, const JsonElemen
     for (std::size_t i = 0; i < *count; ++i) {
         const glm::dvec4 quaternion =
             rotation ? glm::dvec4(rotation->read(i)) : glm::dvec4(0.0, 0.0, 0.0, 1.0);
-        transforms.push_back(compose(translation ? glm::dvec3(translation->read(i)) : glm::dvec3(0.0),
-                                     unit_quaternion(quaternion, extension),
-                                     scale ? glm::dvec3(scale->read(i)) : glm::dvec3(1.0)));
+        transforms.push_back(compose_transform(
+            translation ? glm::dvec3(translation->read(i)) : glm::dvec3(0.0),
+            unit_quaternion(quaternion, extension), scale ? glm::dvec3(scale->read(i)) : glm::dvec3(1.0)));
     }
     return transforms;
 }
@@ -164,7 +172,10 @@ std::vector<glm::dmat4> read_instancing(GltfDocument& document, const JsonElemen
 class NodeReader {
 public:
     NodeReader(GltfDocument& document, GltfMeshes& meshes, Scene& scene)
-        : document_(document), meshes_(meshes), scene_(scene), hierarchy_(read_hierarchy(document)) {}
+        : document_(document), meshes_(meshes), scene_(scene), hierarchy_(read_hierarchy(document)) {
+        scene_.nodes = read_nodes(document, hierarchy_);
+        world_from_node_ = world_from_nodes(scene_.nodes);
+    }
 
     /// Parents before children, siblings in order. Not recursive: files may be deep.
     void read_tree(std::size_t root) {
@@ -173,35 +184,33 @@ public:
                 .fail(fmt::format("a scene names it as a root, but it is a child of node {}",
                                   hierarchy_.parent[root]));
         }
-        std::vector<std::pair<std::size_t, glm::dmat4>> open = {{root, glm::dmat4(1.0)}};
+        std::vector<std::size_t> open = {root};
         while (!open.empty()) {
-            const auto [index, world_from_parent] = open.back();
+            const std::size_t index = open.back();
             open.pop_back();
-            const JsonElement node = document_.element("nodes", index);
-            const glm::dmat4 world_from_node = world_from_parent * local_transform(node);
-            read_node(node, index, world_from_node);
+            read_node(document_.element("nodes", index), static_cast<std::uint32_t>(index));
             const std::vector<std::size_t>& children = hierarchy_.children[index];
-            for (auto child = children.rbegin(); child != children.rend(); ++child) {
-                open.emplace_back(*child, world_from_node);
-            }
+            open.insert(open.end(), children.rbegin(), children.rend());
         }
     }
 
 private:
-    void read_node(const JsonElement& node, std::size_t index, const glm::dmat4& world_from_node) {
-        if (const auto mesh = node.find("mesh")) read_mesh(node, *mesh, index, world_from_node);
+    void read_node(const JsonElement& node, std::uint32_t index) {
+        const glm::dmat4& world_from_node = world_from_node_[index];
+        if (const auto mesh = node.find("mesh")) read_mesh(node, *mesh, index);
         if (const auto camera = node.find("camera")) {
             scene_.cameras.push_back(read_camera(
                 document_.element("cameras", camera->index(document_.count("cameras"), "cameras")), node,
                 world_from_node));
+            scene_.cameras.back().node = index;
         }
         if (const auto light = node.extension("KHR_lights_punctual")) {
             scene_.lights.push_back(read_light(document_, *light, node, world_from_node));
+            std::visit([&](auto& placed) { placed.node = index; }, scene_.lights.back());
         }
     }
 
-    void read_mesh(const JsonElement& node, const JsonElement& mesh, std::size_t index,
-                   const glm::dmat4& world_from_node) {
+    void read_mesh(const JsonElement& node, const JsonElement& mesh, std::uint32_t index) {
         std::optional<std::vector<double>> weights;
         if (const auto given = node.find("weights")) weights = given->numbers(given->size());
         const GltfMeshes::Placement placement =
@@ -219,11 +228,13 @@ private:
         }
         for (const glm::dmat4& transform : node_from_local) {
             try {
-                scene_.instances.push_back(
-                    make_instance(name, placement.mesh, placement.materials, world_from_node * transform));
+                scene_.instances.push_back(make_instance(name, placement.mesh, placement.materials,
+                                                         world_from_node_[index] * transform));
             } catch (const InputError& error) {
                 throw InputError(error.kind(), fmt::format("{}: {}", node.where(), error.what()));
             }
+            scene_.instances.back().node = index;
+            scene_.instances.back().node_from_local = transform;
         }
     }
 
@@ -231,6 +242,7 @@ private:
     GltfMeshes& meshes_;
     Scene& scene_;
     Hierarchy hierarchy_;
+    std::vector<glm::dmat4> world_from_node_;
 };
 
 }  // namespace

@@ -9,7 +9,8 @@
 
 namespace core {
 
-/// Walks the chosen glTF scene in document order and appends instances, lights and cameras to `scene`.
+/// Sets `scene.nodes` to all nodes of the file, walks the chosen glTF scene in document order and appends
+/// instances, lights and cameras to `scene`.
 /// @param selection name or number of the glTF scene; empty: the file's own choice, or scene 0. A file
 /// without scenes has an empty one.
 /// @throws InputError for node cycles, a node with two parents, singular or unbounded transforms.

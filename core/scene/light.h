@@ -4,16 +4,20 @@
 // lights. `range` is a hint to rasterizers and is ignored: falloff is the inverse square.
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <string>
 #include <variant>
+
+#include "core/scene/node.h"
 
 namespace core {
 
 struct PointLight {
     std::string name;
     glm::vec3 position{0.0f};
-    glm::vec3 intensity{0.0f};  ///< cd.
+    glm::vec3 intensity{0.0f};     ///< cd.
+    std::uint32_t node = kNoNode;  ///< Index into Scene::nodes.
 };
 
 struct SpotLight {
@@ -23,6 +27,7 @@ struct SpotLight {
     glm::vec3 intensity{0.0f};               ///< cd, inside the inner cone.
     float cos_inner = 1.0f;
     float cos_outer = 0.70710678f;
+    std::uint32_t node = kNoNode;  ///< Index into Scene::nodes.
 };
 
 /// Light from one direction, or, with an angular radius, from a uniform disc in the sky that camera and
@@ -32,6 +37,7 @@ struct DirectionalLight {
     glm::vec3 direction{0.0f, -1.0f, 0.0f};  ///< Unit, the way it shines.
     glm::vec3 illuminance{0.0f};             ///< lx on a surface that faces it.
     float angular_radius = 0.0f;             ///< Radians; 0 is a delta light, which no ray can hit.
+    std::uint32_t node = kNoNode;            ///< Index into Scene::nodes.
 };
 
 /// The closed set of lights without geometry. A new kind is a struct here and an overload in each function of

@@ -37,8 +37,8 @@ struct Material {
     float alpha_cutoff = 0.5f;
     bool double_sided = false;
     bool unlit =
-        false;  ///< Shows the base colour in cd/m^2 whatever the light: emits it and reflects nothing.
-    float ior = 1.5f;
+        false;         ///< Shows the base colour in cd/m^2 whatever the light: emits it and reflects nothing.
+    float ior = 1.5f;  ///< 0: F0 is specular_color alone, as specular-glossiness materials are converted.
     float specular = 1.0f;        ///< Scales the dielectric's F0 and F90; 0 makes a dielectric Lambert.
     TextureUse specular_texture;  ///< A; linear.
     glm::vec3 specular_color{1.0f};

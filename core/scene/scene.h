@@ -12,9 +12,11 @@
 #include <vector>
 
 #include "core/math/bounds.h"
+#include "core/scene/animation.h"
 #include "core/scene/camera.h"
 #include "core/scene/light.h"
 #include "core/scene/material.h"
+#include "core/scene/node.h"
 #include "core/scene/sky.h"
 #include "core/scene/texture.h"
 
@@ -48,7 +50,10 @@ struct Instance {
     glm::dmat4 world_from_local{1.0};
     glm::dmat4 local_from_world{1.0};
     glm::mat3 normal_from_local{
-        1.0f};  ///< Inverse transpose of the linear part: front stays front in mirrors.
+        1.0f};                     ///< Inverse transpose of the linear part: front stays front in mirrors.
+    std::uint32_t node = kNoNode;  ///< Index into Scene::nodes.
+    glm::dmat4 node_from_local{
+        1.0};  ///< Of EXT_mesh_gpu_instancing; world_from_local is the node's times it.
 };
 
 /// Fills the derived matrices. @throws InputError (kBadData, naming the instance) if the matrix is singular
@@ -68,7 +73,8 @@ struct Scene {
     Sky sky;
     std::string sky_description = "none";  ///< As in `--sky`, for reports.
     std::vector<std::string> extensions_used;
-    std::uint32_t animation_count = 0;
+    std::vector<Node> nodes;            ///< All of the file, in its order, whatever hangs on them.
+    std::vector<Animation> animations;  ///< All of the file; pictures show the rest pose.
     std::vector<std::string> warnings;
 
     const Material& material_of(std::uint32_t instance, std::uint32_t triangle) const {

@@ -169,6 +169,97 @@ TEST(GltfGeometry, NormalisedIntegersSpanZeroToOneOrMinusOneToOne) {
     EXPECT_EQ(mesh.normals[1], glm::vec3(-1, 0, 0));
 }
 
+/// KHR_mesh_quantization: positions, normals, tangents and texture coordinates of 8 and 16 bits.
+TEST(GltfGeometry, QuantisedPositionsStandForThemselvesOrForFractions) {
+    const auto load = [](auto values, GltfBuilder::Component type, bool normalized) {
+        GltfBuilder builder;
+        builder.set("extensionsRequired", R"(["KHR_mesh_quantization"])");
+        const int view = builder.add_view(values, static_cast<int>(4 * sizeof(values[0])));
+        const int position =
+            builder.add_accessor(view, type, 3, "VEC3", fmt::format(R"("normalized":{})", normalized));
+        return load_primitive(builder, with_positions(position)).meshes.at(0).positions.at(1);
+    };
+    // The second of three vertices; every fourth component is padding.
+    const std::vector<std::int8_t> bytes = {0, 0, 0, 9, 127, -127, 51, 9, 0, 1, 0, 9};
+    EXPECT_EQ(load(bytes, GltfBuilder::kByte, false), glm::vec3(127, -127, 51));
+    EXPECT_EQ(load(bytes, GltfBuilder::kByte, true), glm::vec3(1, -1, 51.0f / 127));
+    const std::vector<std::uint8_t> unsigned_bytes = {0, 0, 0, 9, 255, 51, 3, 9, 0, 1, 0, 9};
+    EXPECT_EQ(load(unsigned_bytes, GltfBuilder::kUnsignedByte, false), glm::vec3(255, 51, 3));
+    EXPECT_EQ(load(unsigned_bytes, GltfBuilder::kUnsignedByte, true), glm::vec3(1, 0.2f, 3.0f / 255));
+    const std::vector<std::int16_t> shorts = {0, 0, 0, 9, 32767, -32768, 300, 9, 0, 1, 0, 9};
+    EXPECT_EQ(load(shorts, GltfBuilder::kShort, false), glm::vec3(32767, -32768, 300));
+    EXPECT_EQ(load(shorts, GltfBuilder::kShort, true), glm::vec3(1, -1, 300.0f / 32767));
+    const std::vector<std::uint16_t> unsigned_shorts = {0, 0, 0, 9, 65535, 13107, 300, 9, 0, 1, 0, 9};
+    EXPECT_EQ(load(unsigned_shorts, GltfBuilder::kUnsignedShort, false), glm::vec3(65535, 13107, 300));
+    EXPECT_EQ(load(unsigned_shorts, GltfBuilder::kUnsignedShort, true), glm::vec3(1, 0.2f, 300.0f / 65535));
+}
+
+TEST(GltfGeometry, QuantisedTextureCoordinatesStandForThemselvesOrForFractions) {
+    const auto load = [](auto values, GltfBuilder::Component type, bool normalized) {
+        GltfBuilder builder;
+        const int position = builder.add_floats("VEC3", kTriangle);
+        const int view = builder.add_view(values, 4);
+        const int uv =
+            builder.add_accessor(view, type, 3, "VEC2", fmt::format(R"("normalized":{})", normalized));
+        const core::Scene scene = load_primitive(
+            builder, fmt::format(R"({{"attributes":{{"POSITION":{},"TEXCOORD_0":{}}}}})", position, uv));
+        return scene.meshes.at(0).uvs[0].at(1);
+    };
+    const std::vector<std::int16_t> shorts = {0, 0, -32767, 700, 0, 0};
+    EXPECT_EQ(load(shorts, GltfBuilder::kShort, false), glm::vec2(-32767, 700));
+    EXPECT_EQ(load(shorts, GltfBuilder::kShort, true), glm::vec2(-1, 700.0f / 32767));
+    const std::vector<std::int8_t> bytes = {0, 0, 9, 9, -127, 64, 9, 9, 0, 0, 9, 9};
+    EXPECT_EQ(load(bytes, GltfBuilder::kByte, false), glm::vec2(-127, 64));
+    EXPECT_EQ(load(bytes, GltfBuilder::kByte, true), glm::vec2(-1, 64.0f / 127));
+    const std::vector<std::uint8_t> unsigned_bytes = {0, 0, 9, 9, 200, 64, 9, 9, 0, 0, 9, 9};
+    EXPECT_EQ(load(unsigned_bytes, GltfBuilder::kUnsignedByte, false), glm::vec2(200, 64));
+    const std::vector<std::uint16_t> unsigned_shorts = {0, 0, 40000, 64, 0, 0};
+    EXPECT_EQ(load(unsigned_shorts, GltfBuilder::kUnsignedShort, false), glm::vec2(40000, 64));
+}
+
+TEST(GltfGeometry, QuantisedNormalsAndTangentsAreUnitAgain) {
+    GltfBuilder builder;
+    const int texture = builder.add_texture(1, 1, {128, 128, 255, 255});
+    builder.add("materials", fmt::format(R"({{"normalTexture":{{"index":{}}}}})", texture));
+    const int position = builder.add_floats("VEC3", kTriangle);
+    const int uv = builder.add_floats("VEC2", {0, 1, 1, 1, 0, 0});
+    // 90 and 90 of 127 are 45 degrees, with a length of 1.002.
+    const std::vector<std::int8_t> normals = {90, 0, 90, 0, 0, 0, 127, 0, 0, 0, 127, 0};
+    const std::vector<std::int16_t> tangents = {23170, 0,     -23170, -32767, 32767, 0,
+                                                0,     32767, 32767,  0,      0,     32767};
+    const int normal = builder.add_accessor(builder.add_view(normals, 4), GltfBuilder::kByte, 3, "VEC3",
+                                            R"("normalized":true)");
+    const int tangent = builder.add_accessor(builder.add_view(tangents, 8), GltfBuilder::kShort, 3, "VEC4",
+                                             R"("normalized":true)");
+    const core::Scene scene = load_primitive(
+        builder, fmt::format(R"({{"attributes":{{"POSITION":{},"NORMAL":{},"TANGENT":{},"TEXCOORD_0":{}}},)"
+                             R"("material":0}})",
+                             position, normal, tangent, uv));
+    const core::Mesh& mesh = scene.meshes[0];
+    const float half = std::sqrt(0.5f);
+    // 1e-6: normalised in double, stored in float.
+    EXPECT_LT(glm::length(mesh.normals[0] - glm::vec3(half, 0, half)), 1e-6f);
+    EXPECT_LT(glm::length(glm::vec3(mesh.tangents[0]) - glm::vec3(half, 0, -half)), 1e-6f);
+    EXPECT_EQ(mesh.tangents[0].w, -1.0f);
+    EXPECT_EQ(mesh.tangents[1], glm::vec4(1, 0, 0, 1));
+}
+
+TEST(GltfGeometry, QuantisedMorphTargetsAreInTheUnitsOfTheirPositions) {
+    GltfBuilder builder;
+    const std::vector<std::uint16_t> positions = {0, 0, 0, 0, 1000, 0, 0, 0, 0, 1000, 0, 0};
+    const int position =
+        builder.add_accessor(builder.add_view(positions, 8), GltfBuilder::kUnsignedShort, 3, "VEC3");
+    const std::vector<std::int8_t> displacements = {0, 0, -100, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    const int displacement =
+        builder.add_accessor(builder.add_view(displacements, 4), GltfBuilder::kByte, 3, "VEC3");
+    const int mesh = builder.add(
+        "meshes",
+        fmt::format(R"({{"primitives":[{}],"weights":[0.5]}})",
+                    with_positions(position, fmt::format(R"("targets":[{{"POSITION":{}}}])", displacement))));
+    builder.add("nodes", fmt::format(R"({{"mesh":{}}})", mesh));
+    EXPECT_EQ(corner(builder.load().meshes[0], 0, 0), glm::vec3(0, 0, -50));
+}
+
 TEST(GltfGeometry, VertexColoursOfThreeComponentsAreOpaque) {
     GltfBuilder builder;
     const int position = builder.add_floats("VEC3", kTriangle);
@@ -283,6 +374,8 @@ TEST(GltfGeometry, MorphTargetsStandAtTheirDefaultWeights) {
     ASSERT_EQ(scene.meshes.size(), 2u);
     EXPECT_EQ(corner(scene.meshes[scene.instances[0].mesh], 0, 0), glm::vec3(0, 0, 2));
     EXPECT_EQ(corner(scene.meshes[scene.instances[1].mesh], 0, 0), glm::vec3(0, 0, 0));
+    ASSERT_EQ(scene.warnings.size(), 1u);
+    EXPECT_NE(scene.warnings[0].find("morph targets stand still"), std::string::npos);
 }
 
 TEST(GltfGeometry, ANormalMapMakesTangentsAndOtherMaterialsDoNot) {

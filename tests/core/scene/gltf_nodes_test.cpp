@@ -238,11 +238,4 @@ TEST(GltfNodes, AMeshOrCameraThatIsNotThereIsRefused) {
     EXPECT_NE(error_of_node(R"({"camera":0})").find("is 0, but the file has 0 cameras"), std::string::npos);
 }
 
-TEST(GltfNodes, AnimationsAreCounted) {
-    GltfBuilder builder;
-    builder.add("animations", "{}");
-    builder.add("animations", "{}");
-    EXPECT_EQ(builder.load().animation_count, 2u);
-}
-
 }  // namespace
