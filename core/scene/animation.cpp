@@ -101,7 +101,7 @@ std::vector<double> sample(const AnimationSampler& sampler, bool rotation, doubl
                                        [](double wanted, float key) { return wanted < double{key}; });
     const std::size_t key = next == times.begin() ? 0 : static_cast<std::size_t>(next - times.begin()) - 1;
     const Values identity = {0.0, 0.0, 0.0, 1.0};
-    const Values from = unit_if_rotation(key_values(sampler, key), identity);
+    Values from = unit_if_rotation(key_values(sampler, key), identity);
     if (next == times.begin() || next == times.end() || sampler.interpolation == Interpolation::kStep) {
         return from;
     }

@@ -144,7 +144,7 @@ void GltfDocument::load_buffers(std::optional<std::vector<std::uint8_t>> binary_
         if (const auto uri = buffer.find("uri")) {
             bytes = read_uri(uri->text(), path_.parent_path(), allow_external_, buffer.where());
         } else if (i == 0 && binary_chunk) {
-            bytes = *std::move(binary_chunk);
+            bytes = *std::exchange(binary_chunk, std::nullopt);
         } else if (lists_extension(root(), kMeshopt)) {
             // Fallbacks need not be marked.
             buffers_.emplace_back();
