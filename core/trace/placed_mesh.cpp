@@ -128,6 +128,14 @@ glm::dmat4 world_from_soup(const SharedSoup& soup, const Instance& instance) {
     return result;
 }
 
+Stretch stretch_of(const SharedSoup& soup, const Instance& instance) {
+    const auto longest_column = [](const glm::dmat3& m) {
+        return std::max({glm::length(m[0]), glm::length(m[1]), glm::length(m[2])});
+    };
+    return {longest_column(glm::dmat3(world_from_soup(soup, instance))),
+            longest_column(soup.factor * glm::dmat3(instance.local_from_world))};
+}
+
 PlacedMesh place_shared(const SharedSoup& soup, const Mesh& mesh, const Instance& instance) {
     const DoubleBounds box = local_box(mesh);
     const glm::dmat3 linear = soup.factor * glm::dmat3(instance.local_from_world);

@@ -46,6 +46,12 @@ struct SharedSoup {
 };
 SharedSoup shared_soup(const Mesh& mesh);
 glm::dmat4 world_from_soup(const SharedSoup& soup, const Instance& instance);
+/// Lengths that unit vectors along the axes grow to at most, from either space to the other.
+struct Stretch {
+    double world_from_soup = 1.0;
+    double soup_from_world = 1.0;
+};
+Stretch stretch_of(const SharedSoup& soup, const Instance& instance);
 PlacedMesh place_shared(const SharedSoup& soup, const Mesh& mesh, const Instance& instance);
 
 /// Fills what follows from hits.t[i] and hits.triangle[i]: normal, side and offset.

@@ -19,6 +19,14 @@ namespace {
 /// Triangles that a mesh may have, over all instances together, to be repeated in the flattened level.
 constexpr std::size_t kLargestFlattenedRepeat = 1 << 16;
 
+/// The largest stretch between an instance's space and the world, either way: determinants, products of
+/// three of them, stay in the range of floats.
+constexpr double kLargestStretch = 2e12;
+
+/// Embree asserts that coordinates of rays are under 1.8e18, in the instances' spaces too. A sum of three
+/// products and a translation has room below that.
+constexpr double kLargestRayCoordinate = 1e17;
+
 /// What a geometry of the top level stands for.
 struct TopGeometry {
     std::uint32_t instance = kNoIndex;
@@ -71,9 +79,11 @@ T& lane_of(T (&column)[N], int lane) {
     return column[lane];
 }
 
-/// Copies rays [first, first + Width) and marks the valid ones with -1. Returns whether any is.
+/// Copies rays [first, first + Width) and marks with -1 the valid ones whose origin has no coordinate beyond
+/// `farthest`. Returns whether any is.
 template <int Width>
-bool load_packet(const RayStream& rays, std::size_t first, typename Packet<Width>::Ray& packet, int* valid) {
+bool load_packet(const RayStream& rays, std::size_t first, float farthest,
+                 typename Packet<Width>::Ray& packet, int* valid) {
     // One loop a column, so that the compiler copies whole vectors.
     const auto copy = [first](auto& to, const auto& from) {
         for (int lane = 0; lane < Width; ++lane) lane_of(to, lane) = from[first + std::size_t(lane)];
@@ -90,8 +100,12 @@ bool load_packet(const RayStream& rays, std::size_t first, typename Packet<Width
     int any = 0;
     for (int lane = 0; lane < Width; ++lane) {
         // A range that lies before the origin holds nothing that Embree may be asked about.
-        valid[lane] =
-            is_valid_ray(rays.get(first + std::size_t(lane))) && lane_of(packet.tfar, lane) >= 0.0f ? -1 : 0;
+        const Ray ray = rays.get(first + std::size_t(lane));
+        const glm::vec3 distance = glm::abs(ray.origin);
+        valid[lane] = is_valid_ray(ray) && lane_of(packet.tfar, lane) >= 0.0f &&
+                              std::max({distance.x, distance.y, distance.z}) <= farthest
+                          ? -1
+                          : 0;
         any |= valid[lane];
         lane_of(packet.tnear, lane) = std::max(0.0f, lane_of(packet.tnear, lane));
         lane_of(packet.time, lane) = 0.0f;
@@ -173,6 +187,7 @@ struct TriangleTracer::Impl {
                   const AlphaGeometry* alpha);
     const AlphaGeometry* alpha_of(const PartRun& run, std::uint32_t instance);
     void check_device() const;
+    void check_stretch(const Stretch& stretch, const Instance& instance);
 
     template <int Width>
     void trace_closest(const RayStream& rays, HitStream& hits) const;
@@ -193,6 +208,8 @@ struct TriangleTracer::Impl {
     std::vector<std::unique_ptr<AlphaGeometry>> alpha_geometries;
     std::vector<TopGeometry> top;
     std::vector<PlacedMesh> placed;
+    double world_size = 0.0;  ///< Largest |coordinate| of the world's box.
+    float farthest_origin = static_cast<float>(kLargestRayCoordinate);
 };
 
 TriangleTracer::Impl::Impl(const Scene& traced_scene, const TriangleTracerOptions& options)
@@ -206,6 +223,10 @@ TriangleTracer::Impl::Impl(const Scene& traced_scene, const TriangleTracerOption
         instances_of[scene.instances[i].mesh].push_back(i);
     }
     placed.resize(scene.instances.size());
+    if (const DoubleBounds world = world_bounds(scene); !world.empty()) {
+        const glm::dvec3 farthest = glm::max(glm::abs(world.minimum), glm::abs(world.maximum));
+        world_size = std::max({farthest.x, farthest.y, farthest.z});
+    }
     for (std::uint32_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
         const std::vector<std::uint32_t>& instances = instances_of[mesh];
         if (instances.empty() || scene.meshes[mesh].triangles.empty()) continue;
@@ -265,6 +286,25 @@ void TriangleTracer::Impl::check_device() const {
     throw std::logic_error(fmt::format("Embree reports error {}", static_cast<int>(error)));
 }
 
+/// Embree would end the program on rays that it cannot hold, so no instance may ask it to.
+void TriangleTracer::Impl::check_stretch(const Stretch& stretch, const Instance& instance) {
+    // Written so that NaN is refused.
+    const bool fits = stretch.world_from_soup <= kLargestStretch &&
+                      stretch.soup_from_world <= kLargestStretch &&
+                      world_size * std::max(1.0, stretch.soup_from_world) <= kLargestRayCoordinate;
+    if (!fits) {
+        throw InputError(
+            ErrorKind::kBadData,
+            fmt::format("'{}': instance '{}' is scaled {:.3g}-fold at most and 1 / {:.3g}-fold at "
+                        "least in a world of size {:.3g}; scales of 1e-12 to 1e12 that are not "
+                        "more than 1e17 times smaller than the world can be traced",
+                        scene.name, instance.name, stretch.world_from_soup, stretch.soup_from_world,
+                        world_size));
+    }
+    farthest_origin =
+        std::min(farthest_origin, static_cast<float>(kLargestRayCoordinate / stretch.soup_from_world));
+}
+
 void TriangleTracer::Impl::add_part(RTCScene target, unsigned int id, const TriangleSoup& soup,
                                     const PartRun& run, const AlphaGeometry* alpha) {
     RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -320,6 +360,7 @@ void TriangleTracer::Impl::add_shared(std::uint32_t mesh_index, const std::vecto
     rtcCommitScene(mesh_scene);
 
     for (const std::uint32_t instance : instances) {
+        check_stretch(stretch_of(soup, scene.instances[instance]), scene.instances[instance]);
         const glm::mat4 matrix(world_from_soup(soup, scene.instances[instance]));
         RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_INSTANCE);
         rtcSetGeometryInstancedScene(geometry, mesh_scene);
@@ -349,7 +390,7 @@ void TriangleTracer::Impl::trace_closest(const RayStream& rays, HitStream& hits)
     typename Packet<Width>::RayHit packet;
     alignas(64) int valid[Width];
     for (std::size_t first = 0; first < rays.size(); first += Width) {
-        const bool any = load_packet<Width>(rays, first, packet.ray, valid);
+        const bool any = load_packet<Width>(rays, first, farthest_origin, packet.ray, valid);
         for (int lane = 0; lane < Width; ++lane) {
             lane_of(packet.hit.geomID, lane) = RTC_INVALID_GEOMETRY_ID;
             lane_of(packet.hit.instID[0], lane) = RTC_INVALID_GEOMETRY_ID;
@@ -378,7 +419,7 @@ void TriangleTracer::Impl::trace_occluded(const RayStream& rays, std::span<std::
     typename Packet<Width>::Ray packet;
     alignas(64) int valid[Width];
     for (std::size_t first = 0; first < rays.size(); first += Width) {
-        const bool any = load_packet<Width>(rays, first, packet, valid);
+        const bool any = load_packet<Width>(rays, first, farthest_origin, packet, valid);
         if (any) occlude<Width>(valid, root.get(), &context, &packet);
         const std::size_t count = std::min<std::size_t>(Width, rays.size() - first);
         for (std::size_t lane = 0; lane < count; ++lane) {

@@ -28,13 +28,14 @@ struct TriangleTracerOptions {
 
 /// Two levels: one tree a mesh, one tree over instances.
 ///
-/// Instances may be scaled by 1e-12 to 1e12; beyond that Embree's float determinants leave their range. A
+/// Instances may be scaled by 1e-12 to 1e12, and by no less than 1e-17 of the world's size: beyond that
+/// floats leave their range. Rays that start farther off than 1e17 times the smallest such scale miss. A
 /// negative t_min counts as 0. A triangle without area (collinear corners) is never hit.
 class TriangleTracer : public Tracer {
 public:
     /// Builds the trees, in parallel. Keeps a reference: `scene` must outlive the tracer and not change.
-    /// @throws InputError (kOutOfMemory) if Embree runs out of memory, (kUsage) for options that this
-    /// processor or build cannot meet.
+    /// @throws InputError (kOutOfMemory) if Embree runs out of memory, (kBadData, naming it) for an instance
+    /// whose scale is out of range, (kUsage) for options that this processor or build cannot meet.
     explicit TriangleTracer(const Scene& scene, const TriangleTracerOptions& options = {});
     ~TriangleTracer() override;
 

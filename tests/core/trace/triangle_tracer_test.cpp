@@ -43,6 +43,39 @@ TEST(TriangleTracer, WholeWorldsMayBeTinyOrHuge) {
     }
 }
 
+TEST(TriangleTracer, RefusesByNameWhatFloatsCannotHold) {
+    // Embree ends the program when a ray leaves its range, so such scenes must not reach it.
+    const auto refusal = [](const core::Scene& scene) -> std::string {
+        try {
+            const core::TriangleTracer tracer(scene);
+        } catch (const core::InputError& error) {
+            EXPECT_EQ(error.kind(), core::ErrorKind::kBadData);
+            return error.what();
+        }
+        return "";
+    };
+    const glm::dmat4 far_off = translation({1e18, 0.0, 0.0});
+    for (const glm::dmat4& transform :
+         {scaling(glm::dvec3(1e-37)), scaling(glm::dvec3(1e30)), scaling({1e-20, 1.0, 1e20}), far_off}) {
+        EXPECT_NE(refusal(scene_of(box(), transform)).find("can be traced"), std::string::npos);
+    }
+    core::Scene mixed = scene_of(box(), scaling(glm::dvec3(1e-10)));
+    EXPECT_EQ(refusal(mixed), "");
+    mixed.instances.push_back(core::make_instance("large", 0, {0}, scaling(glm::dvec3(1e10))));
+    EXPECT_NE(refusal(mixed).find(mixed.instances[0].name), std::string::npos);
+}
+
+TEST(TriangleTracer, RaysFromBeyondItsRangeMiss) {
+    const core::Scene scene = scene_of(box(), scaling(glm::dvec3(1e-10)));
+    const core::TriangleTracer tracer(scene);
+    core::HitStream hits;
+    tracer.trace_closest(stream_of({make_ray({0, 0, 1e-9}, {0, 0, -1}), make_ray({0, 0, 1e12}, {0, 0, -1}),
+                                    make_ray({0, 0, 1e30}, {0, 0, -1}), make_ray({3e38, 0, 0}, {-1, 0, 0})}),
+                         hits);
+    EXPECT_TRUE(hits.get(0).hit());
+    for (std::size_t i = 1; i < 4; ++i) EXPECT_FALSE(hits.get(i).hit()) << i;
+}
+
 TEST(TriangleTracer, TrianglesWithoutAreaAreNeverHit) {
     core::Mesh mesh = quad(2.0f, 2.0f);
     // A sliver through the middle, collinear only in exact arithmetic, a point, and the quad behind them.
