@@ -13,6 +13,13 @@
 
 namespace core {
 
+namespace {
+
+/// The sun's disc has 1.6e9 cd/m^2. Beyond this, sums over texels and paths leave the range of floats.
+constexpr float kBrightestTexel = 1e20f;
+
+}  // namespace
+
 struct Sky::Map {
     int width = 0;
     int height = 0;
@@ -103,13 +110,13 @@ Sky Sky::latitude_longitude(const Image& image, float rotation, const std::strin
     for (std::size_t i = 0; i < map->texels.size(); ++i) {
         const glm::vec3& texel = map->texels[i];
         for (int channel = 0; channel < 3; ++channel) {
-            if (!std::isfinite(texel[channel]) || texel[channel] < 0.0f) {
+            // Written so that NaN is refused.
+            if (!(texel[channel] >= 0.0f && texel[channel] <= kBrightestTexel)) {
                 throw InputError(
                     ErrorKind::kBadData,
-                    fmt::format(
-                        "'{}': pixel ({}, {}) is {}; a sky's radiance must be finite and not negative", name,
-                        i % static_cast<std::size_t>(map->width), i / static_cast<std::size_t>(map->width),
-                        texel[channel]));
+                    fmt::format("'{}': pixel ({}, {}) is {}; a sky's radiance must be from 0 to {:g}", name,
+                                i % static_cast<std::size_t>(map->width),
+                                i / static_cast<std::size_t>(map->width), texel[channel], kBrightestTexel));
             }
         }
     }

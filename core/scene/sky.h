@@ -24,7 +24,8 @@ public:
     /// The same radiance from everywhere, cd/m^2. @pre finite, >= 0
     static Sky constant(const glm::vec3& radiance);
 
-    /// @param image beauty in R, G, B, cd/m^2. @throws InputError for negative or non-finite texels, by name.
+    /// @param image beauty in R, G, B, cd/m^2. @throws InputError for texels below 0, above 1e20 or not
+    /// finite, by name.
     static Sky latitude_longitude(const Image& image, float rotation, const std::string& name);
 
     /// Reads a .hdr or .exr. @throws InputError

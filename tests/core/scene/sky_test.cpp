@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "core/math/sampling.h"
 #include "core/support/error.h"
@@ -107,6 +108,24 @@ TEST(Sky, SurvivesOneTexelOfAHundredThousand) {
         ASSERT_TRUE(std::isfinite(sample.pdf) && std::isfinite(sample.radiance.x));
         if (sample.pdf > 0.0f) {
             EXPECT_LT(sample.radiance.x / sample.pdf, 4e4f);
+        }
+    }
+}
+
+TEST(Sky, RefusesTexelsThatSumsCannotHoldByName) {
+    // One short of the largest that an .hdr can hold: finite, but the sum of its neighbourhood is not.
+    for (const float bad :
+         {1.6e38f, -1.0f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+        core::Image image(4, 2);
+        std::vector<glm::vec3> colors(4 * 2, glm::vec3(0.1f));
+        colors[6].y = bad;
+        image.add_color("", colors);
+        try {
+            core::Sky::latitude_longitude(image, 0.0f, "blinding");
+            ADD_FAILURE() << bad << " was taken";
+        } catch (const core::InputError& error) {
+            EXPECT_NE(std::string(error.what()).find("'blinding': pixel (2, 1)"), std::string::npos)
+                << error.what();
         }
     }
 }
