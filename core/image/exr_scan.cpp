@@ -37,6 +37,37 @@ struct Compression {
 constexpr Compression kCompressions[] = {{1, 1},     {1, 64},  {1, 1040}, {16, 1040},  {32, 2048},
                                          {16, 1400}, {32, 32}, {32, 32},  {32, 16384}, {256, 16384}};
 
+/// Types of attributes with the bytes that OpenEXR reads for each, whatever size the file claims: with any
+/// other it would go on reading in the wrong place.
+struct FixedSize {
+    std::string_view type;
+    std::uint32_t bytes;
+};
+constexpr FixedSize kFixedSizes[] = {{"box2f", 16},
+                                     {"box2i", 16},
+                                     {"chromaticities", 32},
+                                     {"compression", 1},
+                                     {"deepImageState", 1},
+                                     {"double", 8},
+                                     {"envmap", 1},
+                                     {"float", 4},
+                                     {"int", 4},
+                                     {"keycode", 28},
+                                     {"lineOrder", 1},
+                                     {"m33d", 72},
+                                     {"m33f", 36},
+                                     {"m44d", 128},
+                                     {"m44f", 64},
+                                     {"rational", 8},
+                                     {"tiledesc", 9},
+                                     {"timecode", 8},
+                                     {"v2d", 16},
+                                     {"v2f", 8},
+                                     {"v2i", 8},
+                                     {"v3d", 24},
+                                     {"v3f", 12},
+                                     {"v3i", 12}};
+
 /// What the scan gathers on its way through the attributes.
 struct Layout {
     std::optional<std::uint8_t> compression;
@@ -106,8 +137,15 @@ private:
             if (size != right)
                 fail(fmt::format("attribute '{}' has {} bytes; {} are right", attribute, size, right));
         };
-        if (attribute == "channels" && type == "chlist") {
+        for (const FixedSize& fixed : kFixedSizes) {
+            if (type == fixed.type) expect_size(fixed.bytes);
+        }
+        if (type == "chlist") {
             scan_channels(end);
+        } else if (type == "stringvector") {
+            scan_strings(attribute, end);
+        } else if (type == "floatvector") {
+            if (size % 4 != 0) fail(fmt::format("attribute '{}' has {} bytes of floats", attribute, size));
         } else if (attribute == "dataWindow" || attribute == "displayWindow") {
             expect_size(16);
             scan_window(attribute);
@@ -146,8 +184,18 @@ private:
         layout_.height = static_cast<std::uint64_t>(max_y - min_y + 1);
     }
 
+    void scan_strings(std::string_view attribute, std::size_t end) {
+        while (position_ < end) {
+            const std::uint64_t length = end - position_ < 4 ? end : read_u32();
+            if (length > end - position_) {
+                fail(fmt::format("attribute '{}' holds a string that is longer than it", attribute));
+            }
+            position_ += static_cast<std::size_t>(length);
+        }
+    }
+
     void scan_channels(std::size_t end) {
-        // A second list replaces the first in the decoder, so that only the larger sum is safe: sum both.
+        // A second list may replace the first in the decoder, so that only the larger sum is safe: sum both.
         while (peek() != 0) {
             const std::string_view channel = read_name("the name of a channel");
             const std::uint32_t type = read_u32();
@@ -158,12 +206,13 @@ private:
                 fail(fmt::format("channel '{}' has sampling {} x {}; 1 or more is right", channel, x_sampling,
                                  y_sampling));
             }
-            if (position_ > end) fail("the list of channels is longer than its attribute");
+            if (position_ >= end) fail("the list of channels is longer than its attribute");
             if (++layout_.channel_count > kMaxChannels)
                 fail(fmt::format("has more than {} channels", kMaxChannels));
             // Subsampled channels count in full: the picture will hold them so.
             layout_.bytes_per_pixel += x_sampling == 1 && y_sampling == 1 ? (type == 1 ? 2 : 4) : 0;
         }
+        if (position_ + 1 != end) fail("the list of channels ends elsewhere than its attribute");
     }
 
     void check(bool tiled) const {

@@ -152,6 +152,38 @@ TEST(ExrDamage, ClaimsBeyondTheLimitsAreRefusedBeforeMemoryIsTaken) {
     }
 }
 
+TEST(ExrDamage, AttributesThatOpenExrWouldReadPastTheirEndAreRefused) {
+    const tests::TemporaryFolder folder;
+    const std::string bytes = sample_bytes(folder.path());
+    const fs::path path = folder.path() / "inserted.exr";
+    const auto refusal_of = [&](const std::string& type, const std::string& value) {
+        std::string size(4, '\0');
+        put_i32(size, 0, static_cast<std::int32_t>(value.size()));
+        const std::string zero(1, '\0');
+        core::write_text_atomically(path,
+                                    std::string(bytes).insert(8, "odd" + zero + type + zero + size + value));
+        try {
+            core::read_exr_info(path);  // The chunks have moved; the header alone is whole.
+        } catch (const core::InputError& error) {
+            return std::string(error.what());
+        }
+        return std::string("was read");
+    };
+    const std::string channel = std::string("X\0", 2) + std::string("\2\0\0\0\0\0\0\0\1\0\0\0\1\0\0\0", 16);
+    const std::string zero(1, '\0');
+    EXPECT_EQ(refusal_of("chlist", channel + zero), "was read")
+        << "a second list of channels is none of ours";
+    EXPECT_NE(refusal_of("chlist", channel + zero + "more").find("ends elsewhere"), std::string::npos);
+    EXPECT_NE(refusal_of("chlist", channel).find("list of channels"), std::string::npos);
+    EXPECT_NE(refusal_of("float", "123456").find("has 6 bytes; 4 are right"), std::string::npos);
+    EXPECT_NE(refusal_of("floatvector", "12345").find("5 bytes of floats"), std::string::npos);
+    const std::string one_text("\3\0\0\0abc", 7);
+    EXPECT_EQ(refusal_of("stringvector", one_text + one_text), "was read");
+    EXPECT_NE(refusal_of("stringvector", one_text + "\xff\xff\xff\xff").find("longer than it"),
+              std::string::npos);
+    EXPECT_EQ(refusal_of("unheard_of", "anything"), "was read");
+}
+
 TEST(ExrDamage, ADataWindowBesideTheOriginIsReadWhereItLies) {
     const tests::TemporaryFolder folder;
     std::string bytes = sample_bytes(folder.path());
