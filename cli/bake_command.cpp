@@ -118,6 +118,9 @@ void bake(Program& program, const BakeOptions& options) {
         program.exit_code = stop_exit_code();
         return;
     }
+    if (result.meshes.empty()) {
+        warn(program, fmt::format("'{}': has no triangles, so no field was written", scene.name));
+    }
     report(program, result);
     throw_failures(result);
 }

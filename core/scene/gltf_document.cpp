@@ -21,8 +21,9 @@ constexpr std::uint32_t kBinaryChunk = 0x004e4942;  // "BIN"
 constexpr std::size_t kGlbHeaderSize = 12;
 constexpr std::size_t kChunkHeaderSize = 8;
 
-/// What decoded geometry may take: generous for real files, whose attributes grow at most some twenty-fold.
-constexpr std::uint64_t kMemoryAllowance = std::uint64_t{256} << 20;
+/// What decoding may take: generous for real files, whose attributes and pictures grow at most some
+/// twenty-fold, and small enough that no small file takes half a gigabyte, copies on the way included.
+constexpr std::uint64_t kMemoryAllowance = std::uint64_t{192} << 20;
 constexpr std::uint64_t kMemoryPerFileByte = 64;
 /// Draco brings a vertex with its two triangles down to some three bytes, which take 450 while they are read.
 constexpr std::uint64_t kMemoryPerDracoFileByte = 256;
@@ -51,9 +52,9 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, bool allow_externa
     json_ = std::make_unique<nlohmann::json>(parse_limited_json(text, file_name_));
     check_asset();
     for (const std::string& warning : check_extensions(root())) warn_once(warning);
-    load_buffers(std::move(binary_chunk_));
+    load_buffers();
     std::uint64_t byte_count = file_size;
-    for (const auto& buffer : buffers_) byte_count += buffer.size();
+    for (const Buffer& buffer : buffers_) byte_count += buffer.bytes.size();
     memory_per_file_byte_ =
         lists_extension(root(), "KHR_draco_mesh_compression") ? kMemoryPerDracoFileByte : kMemoryPerFileByte;
     memory_limit_ = kMemoryAllowance + memory_per_file_byte_ * byte_count;
@@ -77,7 +78,15 @@ JsonElement GltfDocument::element(const char* array, std::size_t index) const {
 
 std::string GltfDocument::read_json_text(std::vector<std::uint8_t>& file) {
     if (file.size() < 4 || read_u32(file, 0) != kGlbMagic) {
-        return {reinterpret_cast<const char*>(file.data()), file.size()};
+        std::string text(reinterpret_cast<const char*>(file.data()), file.size());
+        file = {};
+        // Spaces and a byte order mark may stand before JSON.
+        const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+        if (first != std::string::npos && text[first] == '{') return text;
+        throw InputError(
+            ErrorKind::kBadData,
+            fmt::format("'{}': begins neither with 'glTF', as a .glb does, nor with '{{', as a .gltf does",
+                        file_name_));
     }
     const auto refuse = [&](const std::string& reason) {
         throw InputError(ErrorKind::kBadData, fmt::format("'{}': GLB {}", file_name_, reason));
@@ -116,8 +125,7 @@ std::string GltfDocument::read_json_text(std::vector<std::uint8_t>& file) {
         offset += chunk_length;
     }
     if (!has_json) refuse("has no JSON chunk");
-    file.clear();
-    file.shrink_to_fit();
+    file = {};
     return text;
 }
 
@@ -131,34 +139,41 @@ void GltfDocument::check_asset() const {
     }
 }
 
-void GltfDocument::load_buffers(std::optional<std::vector<std::uint8_t>> binary_chunk) {
+void GltfDocument::load_buffers() {
     for (std::size_t i = 0; i < count("buffers"); ++i) {
-        const JsonElement buffer = element("buffers", i);
-        const std::uint64_t byte_length = buffer.require("byteLength").unsigned_integer();
-        if (byte_length == 0) buffer.fail("byteLength must be at least 1");
-        std::vector<std::uint8_t> bytes;
-        if (is_fallback(buffer)) {
-            buffers_.emplace_back();
-            continue;
+        Buffer& buffer = buffers_.emplace_back();
+        try {
+            buffer.bytes = read_buffer(i);
+        } catch (const InputError& error) {
+            // What the picture does not need may be broken, as images and meshes may be.
+            buffer.trouble = error;
+            warn_once(fmt::format("a buffer is left out: {}", error.what()));
         }
-        if (const auto uri = buffer.find("uri")) {
-            bytes = read_uri(uri->text(), path_.parent_path(), allow_external_, buffer.where());
-        } else if (i == 0 && binary_chunk) {
-            bytes = *std::exchange(binary_chunk, std::nullopt);
-        } else if (lists_extension(root(), kMeshopt)) {
-            // Fallbacks need not be marked.
-            buffers_.emplace_back();
-            continue;
-        } else {
-            buffer.fail("has no uri, and only the first buffer of a GLB may be its binary chunk");
-        }
-        if (byte_length > bytes.size()) {
-            buffer.fail(
-                fmt::format("byteLength is {}, but the data ends after {} bytes", byte_length, bytes.size()));
-        }
-        bytes.resize(static_cast<std::size_t>(byte_length));
-        buffers_.push_back(std::move(bytes));
     }
+}
+
+/// The bytes of a buffer; none for a placeholder.
+std::vector<std::uint8_t> GltfDocument::read_buffer(std::size_t index) {
+    const JsonElement buffer = element("buffers", index);
+    const std::uint64_t byte_length = buffer.require("byteLength").unsigned_integer();
+    if (byte_length == 0) buffer.fail("byteLength must be at least 1");
+    if (is_fallback(buffer)) return {};
+    std::vector<std::uint8_t> bytes;
+    if (const auto uri = buffer.find("uri")) {
+        bytes = read_uri(uri->text(), path_.parent_path(), allow_external_, buffer.where());
+    } else if (index == 0 && binary_chunk_) {
+        bytes = *std::exchange(binary_chunk_, std::nullopt);
+    } else if (lists_extension(root(), kMeshopt)) {
+        return {};  // Fallbacks need not be marked.
+    } else {
+        buffer.fail("has no uri, and only the first buffer of a GLB may be its binary chunk");
+    }
+    if (byte_length > bytes.size()) {
+        buffer.fail(
+            fmt::format("byteLength is {}, but the data ends after {} bytes", byte_length, bytes.size()));
+    }
+    bytes.resize(static_cast<std::size_t>(byte_length));
+    return bytes;
 }
 
 void GltfDocument::decode_compressed_views() {
@@ -175,7 +190,8 @@ void GltfDocument::decode_compressed_views() {
 /// The bytes that an object with buffer, byteOffset and byteLength refers to.
 std::span<const std::uint8_t> GltfDocument::buffer_range(const JsonElement& object) const {
     const std::size_t index = object.require("buffer").index(buffers_.size(), "buffers");
-    const std::vector<std::uint8_t>& buffer = buffers_[index];
+    if (buffers_[index].trouble) throw InputError(*buffers_[index].trouble);
+    const std::vector<std::uint8_t>& buffer = buffers_[index].bytes;
     const std::uint64_t offset = object.unsigned_or("byteOffset", 0);
     const std::uint64_t length = object.require("byteLength").unsigned_integer();
     if (length == 0) object.fail("byteLength must be at least 1");
@@ -213,9 +229,7 @@ std::vector<std::uint8_t> GltfDocument::read_image(std::size_t index) const {
 }
 
 void GltfDocument::warn_once(const std::string& warning) {
-    if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) {
-        warnings_.push_back(warning);
-    }
+    warnings_.add(warning);
 }
 
 void GltfDocument::charge_memory(std::size_t element_count, std::size_t bytes_each,
@@ -224,9 +238,11 @@ void GltfDocument::charge_memory(std::size_t element_count, std::size_t bytes_ea
     const bool representable = element_count <= (std::uint64_t{1} << 40);
     if (representable) memory_charged_ += static_cast<std::uint64_t>(element_count) * bytes_each;
     if (representable && memory_charged_ <= memory_limit_) return;
-    throw InputError(ErrorKind::kOutOfMemory,
-                     fmt::format("{}: the file asks for more than {} MiB of decoded data, {} times its size",
-                                 element.where(), memory_limit_ >> 20, memory_per_file_byte_));
+    throw InputError(
+        ErrorKind::kOutOfMemory,
+        fmt::format("{}: the file unpacks to more than {} MiB; {} MiB and {} times its own size "
+                    "are allowed",
+                    element.where(), memory_limit_ >> 20, kMemoryAllowance >> 20, memory_per_file_byte_));
 }
 
 }  // namespace core

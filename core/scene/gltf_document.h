@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "core/scene/gltf_json.h"
+#include "core/scene/warning_list.h"
+#include "core/support/error.h"
 
 namespace core {
 
@@ -20,7 +22,8 @@ namespace core {
 class GltfDocument {
 public:
     /// Reads a .gltf or .glb (told apart by content) and all its buffers, decodes compressed buffer views,
-    /// and checks `asset` and the required extensions. @throws InputError
+    /// and checks `asset` and the required extensions. A buffer that cannot be read is no error until
+    /// something refers to it. @throws InputError
     GltfDocument(const std::filesystem::path& path, bool allow_external);
     ~GltfDocument();
     GltfDocument(const GltfDocument&) = delete;
@@ -35,6 +38,7 @@ public:
     JsonElement element(const char* array, std::size_t index) const;
 
     /// The bytes of a buffer view, decoded if it is compressed, and its stride (0: tightly packed).
+    /// @throws InputError also for what kept the buffer from being read
     struct BufferView {
         std::span<const std::uint8_t> bytes;
         std::size_t stride = 0;
@@ -44,18 +48,20 @@ public:
     /// The still encoded bytes of an image, from its URI or buffer view.
     std::vector<std::uint8_t> read_image(std::size_t index) const;
 
-    /// Says something once, however often it is met.
+    /// Says something once, however often it is met; past WarningList::kMost things, only that there is more.
     void warn_once(const std::string& warning);
-    const std::vector<std::string>& warnings() const { return warnings_; }
+    std::vector<std::string> warnings() const { return warnings_.all(); }
 
-    /// Counts memory that decoding takes, so that a small file that refers to the same data over and over
-    /// cannot ask for any amount. @throws InputError (kOutOfMemory) past a multiple of the file's size.
+    /// Counts memory that decoding takes or walks through, so that a small file that refers to the same data
+    /// over and over cannot ask for any amount. @throws InputError (kOutOfMemory) past a multiple of the
+    /// file's size.
     void charge_memory(std::size_t count, std::size_t bytes_each, const JsonElement& element);
 
 private:
     std::string read_json_text(std::vector<std::uint8_t>& file);
     void check_asset() const;
-    void load_buffers(std::optional<std::vector<std::uint8_t>> binary_chunk);
+    void load_buffers();
+    std::vector<std::uint8_t> read_buffer(std::size_t index);
     void decode_compressed_views();
     std::span<const std::uint8_t> buffer_range(const JsonElement& object) const;
 
@@ -64,9 +70,13 @@ private:
     bool allow_external_;
     std::unique_ptr<nlohmann::json> json_;
     std::optional<std::vector<std::uint8_t>> binary_chunk_;
-    std::vector<std::vector<std::uint8_t>> buffers_;  ///< Empty: a placeholder without data.
+    struct Buffer {
+        std::vector<std::uint8_t> bytes;    ///< Empty: a placeholder without data.
+        std::optional<InputError> trouble;  ///< Why there are no bytes.
+    };
+    std::vector<Buffer> buffers_;
     std::map<std::size_t, std::vector<std::uint8_t>> decoded_views_;
-    std::vector<std::string> warnings_;
+    WarningList warnings_;
     std::uint64_t memory_per_file_byte_ = 0;
     std::uint64_t memory_limit_ = 0;
     std::uint64_t memory_charged_ = 0;

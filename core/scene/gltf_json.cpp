@@ -13,13 +13,19 @@ namespace core {
 namespace {
 
 constexpr int kMaximumDepth = 200;
-/// Each value costs some fifty bytes once parsed, against two in the text.
-constexpr std::size_t kMaximumValueCount = std::size_t{1} << 23;
+
+/// What a character of the text can cost once parsed, in bytes on a 64-bit machine: a container on the heap,
+/// a value in an array that has just grown, a member's node and key.
+constexpr std::size_t kBytesPerContainer = 64;
+constexpr std::size_t kBytesPerComma = 40;
+constexpr std::size_t kBytesPerMember = 96;
+/// Room for a scene of some 300,000 nodes with matrices and names.
+constexpr std::size_t kMaximumParsedBytes = std::size_t{320} << 20;
 
 /// Walks the brackets without building anything; strings are skipped.
 void check_limits(std::string_view text, const std::string& file_name) {
     int depth = 0;
-    std::size_t value_count = 0;
+    std::size_t parsed_bytes = 0;
     bool in_string = false;
     for (std::size_t i = 0; i < text.size(); ++i) {
         const char c = text[i];
@@ -34,15 +40,18 @@ void check_limits(std::string_view text, const std::string& file_name) {
         if (c == '"') in_string = true;
         if (c == '[' || c == '{') ++depth;
         if (c == ']' || c == '}') --depth;
-        if (c == '[' || c == '{' || c == ',') ++value_count;
+        if (c == '[' || c == '{') parsed_bytes += kBytesPerContainer;
+        if (c == ',') parsed_bytes += kBytesPerComma;
+        if (c == ':') parsed_bytes += kBytesPerMember;
         if (depth > kMaximumDepth) {
             throw InputError(ErrorKind::kBadData,
                              fmt::format("'{}': JSON is nested more than {} deep at byte {}", file_name,
                                          kMaximumDepth, i));
         }
-        if (value_count > kMaximumValueCount) {
-            throw InputError(ErrorKind::kBadData, fmt::format("'{}': JSON has more than {} values", file_name,
-                                                              kMaximumValueCount));
+        if (parsed_bytes > kMaximumParsedBytes) {
+            throw InputError(ErrorKind::kBadData,
+                             fmt::format("'{}': JSON would take more than {} MiB; at most that is parsed",
+                                         file_name, kMaximumParsedBytes >> 20));
         }
     }
 }
@@ -54,8 +63,11 @@ nlohmann::json parse_limited_json(std::string_view text, const std::string& file
     try {
         return nlohmann::json::parse(text);
     } catch (const nlohmann::json::exception& error) {
-        throw InputError(ErrorKind::kBadData,
-                         fmt::format("'{}': not valid JSON: {}", file_name, error.what()));
+        // The library begins with its own name and number in brackets, and quotes what may be a long string.
+        constexpr std::size_t kShown = 200;
+        const std::string_view reason = error.what();
+        throw InputError(ErrorKind::kBadData, fmt::format("'{}': not valid JSON: {}", file_name,
+                                                          reason.substr(reason.find("] ") + 2, kShown)));
     }
 }
 

@@ -12,7 +12,7 @@
 
 namespace core {
 
-/// Parses JSON text. Depth and number of values are limited before anything is built.
+/// Parses JSON text. Depth and the memory that it takes are limited before anything is built.
 /// @param file_name for messages. @throws InputError (kBadData)
 nlohmann::json parse_limited_json(std::string_view text, const std::string& file_name);
 

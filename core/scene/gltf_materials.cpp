@@ -283,7 +283,28 @@ private:
         return entry->second;
     }
 
+    /// The name of an image in messages.
+    std::string image_name(std::size_t gltf_image) const {
+        return fmt::format("{} {}", document_.file_name(), document_.element("images", gltf_image).path());
+    }
+
+    /// Counts what the images unpack to beyond what files of their size usually do.
+    void charge_images() {
+        constexpr std::size_t kUsualExpansion = 64;
+        for (const ImageSource& source : images_) {
+            if (source.glossiness) continue;
+            const std::vector<std::uint8_t> encoded = document_.read_image(source.gltf_image);
+            const glm::ivec2 size = texture_image_size(encoded, image_name(source.gltf_image));
+            const std::size_t decoded =
+                4 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
+            const std::size_t usual = kUsualExpansion * encoded.size();
+            document_.charge_memory(decoded > usual ? decoded - usual : 0, 1,
+                                    document_.element("images", source.gltf_image));
+        }
+    }
+
     void load_images() {
+        charge_images();
         result_.images.resize(images_.size());
         for_each_image([&](std::size_t i) {
             if (!images_[i].glossiness) result_.images[i] = decode_image(images_[i].gltf_image);
@@ -321,11 +342,8 @@ private:
     }
 
     TextureImage decode_image(std::size_t gltf_image) const {
-        const JsonElement element = document_.element("images", gltf_image);
-        const std::vector<std::uint8_t> encoded = document_.read_image(gltf_image);
-        TextureImage image =
-            decode_texture_image(encoded, fmt::format("{} {}", document_.file_name(), element.path()));
-        image.name = element.text_or("name", "");
+        TextureImage image = decode_texture_image(document_.read_image(gltf_image), image_name(gltf_image));
+        image.name = document_.element("images", gltf_image).text_or("name", "");
         return image;
     }
 

@@ -59,16 +59,38 @@ const GltfMeshes::GltfMesh& GltfMeshes::parsed(std::size_t gltf_mesh) {
         }
         result.primitives.push_back({std::move(source), primitive, material});
     }
+    warn_of_missing_uvs(result);
     return result;
 }
 
-GltfMeshes::Placement GltfMeshes::place(std::size_t gltf_mesh, const std::vector<double>* node_weights) {
+void GltfMeshes::warn_of_missing_uvs(const GltfMesh& mesh) const {
+    for (const Primitive& primitive : mesh.primitives) {
+        if (primitive.material >= materials_.size()) continue;
+        const Material& material = materials_[primitive.material];
+        for (const TextureUse* use :
+             {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture,
+              &material.emission_texture, &material.specular_texture, &material.specular_color_texture}) {
+            if (!use->present()) continue;
+            if (primitive.source.uvs[static_cast<std::size_t>(use->uv_set)] != kNoAccessor) continue;
+            document_.warn_once(
+                fmt::format("{}: material '{}' needs TEXCOORD_{}, which is missing; textures "
+                            "show their corner alone",
+                            primitive.element.path(), material.name, use->uv_set));
+        }
+    }
+}
+
+const GltfMeshes::Placement& GltfMeshes::place(std::size_t gltf_mesh,
+                                               const std::vector<double>* node_weights) {
     const GltfMesh& mesh = parsed(gltf_mesh);
     Key key;
     key.weights = node_weights ? *node_weights : mesh.weights;
     // Weights of 0 leave the geometry as it is.
     while (!key.weights.empty() && key.weights.back() == 0.0) key.weights.pop_back();
-    Placement placement;
+    // A mesh of many primitives at many nodes is gone through once.
+    const auto [known, is_first] = placements_.try_emplace({gltf_mesh, key.weights});
+    Placement& placement = known->second;
+    if (!is_first) return placement;
     for (const Primitive& primitive : mesh.primitives) {
         key.sources.push_back(primitive.source);
         placement.materials.push_back(primitive.material);

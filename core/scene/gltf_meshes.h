@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/scene/gltf_document.h"
@@ -26,7 +27,7 @@ public:
     };
     /// Notes that a node shows a glTF mesh. @param node_weights of the morph targets, where the node has
     /// some; they replace the mesh's.
-    Placement place(std::size_t gltf_mesh, const std::vector<double>* node_weights);
+    const Placement& place(std::size_t gltf_mesh, const std::vector<double>* node_weights);
 
     bool uses_default_material() const { return uses_default_material_; }
 
@@ -56,11 +57,13 @@ private:
     };
 
     const GltfMesh& parsed(std::size_t gltf_mesh);
+    void warn_of_missing_uvs(const GltfMesh& mesh) const;
     Mesh build_one(const Geometry& geometry);
 
     GltfDocument& document_;
     const std::vector<Material>& materials_;
     std::map<std::size_t, GltfMesh> parsed_;
+    std::map<std::pair<std::size_t, std::vector<double>>, Placement> placements_;  ///< By mesh and weights.
     std::map<Key, std::uint32_t> mesh_of_key_;
     std::vector<Geometry> geometries_;
     bool uses_default_material_ = false;

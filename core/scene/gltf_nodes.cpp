@@ -156,7 +156,7 @@ std::vector<glm::dmat4> read_instancing(GltfDocument& document, const JsonElemen
         count = (*accessor)->count();
     }
     if (!count) attributes.fail("has none of TRANSLATION, ROTATION, SCALE");
-    document.charge_memory(*count, sizeof(Instance) + sizeof(glm::dmat4), extension);
+    document.charge_memory(*count, sizeof(glm::dmat4), extension);
     std::vector<glm::dmat4> transforms;
     transforms.reserve(*count);
     for (std::size_t i = 0; i < *count; ++i) {
@@ -213,7 +213,7 @@ private:
     void read_mesh(const JsonElement& node, const JsonElement& mesh, std::uint32_t index) {
         std::optional<std::vector<double>> weights;
         if (const auto given = node.find("weights")) weights = given->numbers(given->size());
-        const GltfMeshes::Placement placement =
+        const GltfMeshes::Placement& placement =
             meshes_.place(mesh.index(document_.count("meshes"), "meshes"), weights ? &*weights : nullptr);
         if (node.has("skin")) {
             document_.warn_once("skins are ignored: skinned meshes stand under their node's transform");
@@ -223,9 +223,11 @@ private:
         std::vector<glm::dmat4> node_from_local = {glm::dmat4(1.0)};
         if (const auto extension = node.extension("EXT_mesh_gpu_instancing")) {
             node_from_local = read_instancing(document_, *extension);
-        } else {
-            document_.charge_memory(1, sizeof(Instance), node);
         }
+        document_.charge_memory(
+            node_from_local.size(),
+            sizeof(Instance) + name.size() + placement.materials.size() * sizeof(placement.materials.front()),
+            node);
         for (const glm::dmat4& transform : node_from_local) {
             try {
                 scene_.instances.push_back(make_instance(name, placement.mesh, placement.materials,

@@ -132,6 +132,7 @@ private:
             const std::size_t index = source_.targets[t].*target_accessor;
             const auto weight = static_cast<float>(weights_[t]);
             if (index == kNoAccessor || weight == 0.0f) continue;
+            document_.charge_memory(used.size(), sizeof(glm::vec3), primitive_);
             const GltfAccessor displacement = open_plain(index, name, 3, 3);
             for (std::size_t i = 0; i < used.size(); ++i) {
                 result[i] += Vector(weight * displacement.read(used[i]));

@@ -121,6 +121,10 @@ std::vector<std::uint8_t> read_whole_file(const fs::path& path, const std::strin
     if (size < 0) {
         throw InputError(ErrorKind::kNoInput, fmt::format("{}: '{}' cannot be opened", what, path.string()));
     }
+    if (static_cast<std::uint64_t>(size) > kMaximumSceneFileBytes) {
+        throw InputError(ErrorKind::kBadData, fmt::format("{}: '{}' has {} bytes; at most {} are read", what,
+                                                          path.string(), size, kMaximumSceneFileBytes));
+    }
     std::vector<std::uint8_t> bytes(static_cast<std::size_t>(size));
     stream.seekg(0);
     if (!stream.read(reinterpret_cast<char*>(bytes.data()), size)) {
@@ -179,6 +183,7 @@ std::vector<std::uint8_t> read_uri(const std::string& uri, const fs::path& folde
                    ? "names a file by scheme; it is followed only with --allow-external"
                    : fmt::format("has the scheme '{}'; only data: and relative paths are read", scheme));
     }
+    if (uri.starts_with(':')) refuse(what, uri, "has an empty scheme; a path relative to the file is read");
     std::string decoded = percent_decoded(uri);
     if (local_file) {
         decoded.erase(0, decoded.find(':') + 1);

@@ -10,8 +10,12 @@
 
 namespace core {
 
+/// No file that a scene names may be larger; the length field of a GLB ends there, too.
+inline constexpr std::uint64_t kMaximumSceneFileBytes = std::uint64_t{1} << 32;
+
 /// Reads a whole regular file.
-/// @throws InputError kNoInput if it is missing or unreadable, kBadData if it is a folder, pipe or device.
+/// @throws InputError kNoInput if it is missing or unreadable, kBadData if it is a folder, pipe or device, or
+/// larger than kMaximumSceneFileBytes.
 std::vector<std::uint8_t> read_whole_file(const std::filesystem::path& path, const std::string& what);
 
 /// %XX decoded (RFC 3986, section 2.1); a % that starts no such triple stands for itself.

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <new>
+#include <string_view>
 
 #include "core/image/tonemap.h"
 #include "core/support/error.h"
@@ -87,13 +89,27 @@ glm::vec4 texel(const TextureImage& image, int x, int y, const std::array<float,
     return {color_table[rgba[0]], color_table[rgba[1]], color_table[rgba[2]], kUnitFromByte[rgba[3]]};
 }
 
+/// Grey in all colours where there is one channel or two; opaque where there is no alpha.
+std::vector<std::uint8_t> with_four_channels(const std::uint8_t* pixels, int channel_count,
+                                             std::size_t pixel_count) {
+    std::vector<std::uint8_t> rgba(4 * pixel_count);
+    const bool has_color = channel_count >= 3, has_alpha = channel_count % 2 == 0;
+    for (std::size_t i = 0; i < pixel_count; ++i) {
+        const std::uint8_t* source = pixels + static_cast<std::size_t>(channel_count) * i;
+        std::uint8_t* target = rgba.data() + 4 * i;
+        for (int color = 0; color < 3; ++color) target[color] = source[has_color ? color : 0];
+        target[3] = has_alpha ? source[channel_count - 1] : 255;
+    }
+    return rgba;
+}
+
 }  // namespace
 
 bool is_texture_image(std::span<const std::uint8_t> encoded) {
     return is_png(encoded) || starts_with(encoded, {0xff, 0xd8, 0xff});
 }
 
-TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const std::string& name) {
+glm::ivec2 texture_image_size(std::span<const std::uint8_t> encoded, const std::string& name) {
     if (!is_texture_image(encoded)) refuse(name, "is neither PNG nor JPEG, the two formats of glTF");
     const bool png = is_png(encoded);
     if (encoded.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
@@ -117,16 +133,28 @@ TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const s
         refuse(name, fmt::format("claims {} x {} texels in {} bytes; the file is damaged", width, height,
                                  encoded.size()));
     }
-    const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
-        stbi_load_from_memory(encoded.data(), byte_count, &width, &height, &channel_count, 4),
-        stbi_image_free);
-    if (!pixels) refuse(name, fmt::format("cannot be decoded ({})", stbi_failure_reason()));
+    return {width, height};
+}
 
+TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const std::string& name) {
+    const glm::ivec2 size = texture_image_size(encoded, name);
     TextureImage image;
     image.name = name;
-    image.width = width;
-    image.height = height;
-    image.rgba.assign(pixels.get(), pixels.get() + 4 * texel_count);
+    image.width = size.x;
+    image.height = size.y;
+    // As many channels as the file has: four would be made beside them, and the peak is what limits count.
+    int channel_count = 0;
+    const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+        stbi_load_from_memory(encoded.data(), static_cast<int>(encoded.size()), &image.width, &image.height,
+                              &channel_count, 0),
+        stbi_image_free);
+    if (!pixels) {
+        const std::string_view reason = stbi_failure_reason();
+        if (reason == "outofmem") throw std::bad_alloc();
+        refuse(name, fmt::format("cannot be decoded ({})", reason));
+    }
+    image.rgba = with_four_channels(pixels.get(), channel_count,
+                                    static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y));
     return image;
 }
 

@@ -31,7 +31,11 @@ struct Texture {
 /// Whether bytes begin as PNG or JPEG do.
 bool is_texture_image(std::span<const std::uint8_t> encoded);
 
-/// Decodes a PNG or JPEG held in memory. `name` is used in messages.
+/// Width and height of a PNG or JPEG held in memory, from its header alone. `name` is used in messages.
+/// @throws InputError as decode_texture_image does
+glm::ivec2 texture_image_size(std::span<const std::uint8_t> encoded, const std::string& name);
+
+/// Decodes a PNG or JPEG held in memory.
 /// @throws InputError (kBadData) for anything stb cannot read, and for more than 2^28 texels.
 TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const std::string& name);
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/scene/gltf_uri.h"
+#include "core/scene/warning_list.h"
 #include "core/support/error.h"
 #include "tests/core/scene/gltf_builder.h"
 #include "tests/support/shared_data.h"
@@ -91,6 +92,14 @@ TEST_F(UriTest, TheNetworkIsNeverAsked) {
     }
 }
 
+TEST_F(UriTest, FilesBeyondTheLimitAreRefusedBeforeMemoryIsTaken) {
+    write_buffer("data.bin");
+    // Sparse: it takes no disk.
+    fs::resize_file(folder() / "data.bin", core::kMaximumSceneFileBytes + 1);
+    EXPECT_NE(error("data.bin").find("at most 4294967296 are read"), std::string::npos) << error("data.bin");
+    EXPECT_NE(error(":").find("empty scheme"), std::string::npos);
+}
+
 TEST_F(UriTest, BackslashesAndNulAreRefused) {
     EXPECT_NE(error("sub%5Cdata.bin").find("backslash"), std::string::npos);
     EXPECT_NE(error("data.bin%00.png").find("NUL"), std::string::npos);
@@ -141,6 +150,24 @@ TEST(GltfFiles, BuffersThatEndEarlyAreRefused) {
     EXPECT_NE(error.find("byteLength is 72, but the data ends after 3 bytes"), std::string::npos) << error;
 }
 
+TEST(GltfFiles, ABufferThatNothingDrawnNeedsMayBeBroken) {
+    for (const char* broken : {R"({"byteLength":4})", R"({"byteLength":4,"uri":"absent.bin"})",
+                               R"({"byteLength":0,"uri":"data:,"})", R"({"uri":"data:,abc"})", "7",
+                               R"({"byteLength":4,"uri":"http://example.com/a.bin"})"}) {
+        GltfBuilder builder = triangle_at_a_node();
+        std::string text = builder.json();
+        text.insert(text.find("\"buffers\":[") + 11, "{},");
+        text.replace(text.find("{},"), 2, broken);
+        // The triangle's views still name buffer 0, which is now the broken one.
+        EXPECT_NE(tests::error_of_text(text), "no error") << broken;
+        for (std::size_t at; (at = text.find("\"buffer\":0")) != std::string::npos;) text[at + 9] = '1';
+        const core::Scene scene = tests::load_text(text);
+        EXPECT_EQ(core::drawn_triangle_count(scene), 1u) << broken;
+        ASSERT_EQ(scene.warnings.size(), 1u) << broken;
+        EXPECT_NE(scene.warnings[0].find("buffers[0]"), std::string::npos) << scene.warnings[0];
+    }
+}
+
 TEST(GltfFiles, AccessorsThatReachPastTheirViewAreRefusedBeforeMemoryIsTaken) {
     for (const char* count : {"4", "1000000000", "4611686018427387904", "18446744073709551615"}) {
         GltfBuilder builder;
@@ -176,6 +203,65 @@ TEST(GltfFiles, SmallFilesCannotAskForBoundlessMemory) {
     EXPECT_NE(builder.error().find("(kind 71"), std::string::npos) << builder.error();
 }
 
+TEST(GltfFiles, SmallPicturesCannotAskForBoundlessMemory) {
+    // A header may promise what one colour would compress to. Nothing is decoded to see that it is too much.
+    std::vector<std::uint8_t> png = tests::encode_png(64, 64, std::vector<std::uint8_t>(4 * 64 * 64));
+    for (const std::size_t side : {16u, 20u}) {
+        png[side + 2] = 8000 >> 8;
+        png[side + 3] = 8000 & 255;
+    }
+    GltfBuilder builder = triangle_at_a_node();
+    builder.add("images", fmt::format(R"({{"bufferView":{},"name":"bomb"}})", builder.add_view(png)));
+    builder.add("textures", R"({"source":0})");
+    builder.add("materials", R"({"normalTexture":{"index":0}})");
+    EXPECT_NE(builder.error().find("images[0] 'bomb': the file unpacks to more than"), std::string::npos)
+        << builder.error();
+    EXPECT_NE(builder.error().find("(kind 71"), std::string::npos) << builder.error();
+}
+
+TEST(GltfFiles, MorphTargetsOfOneAccessorCannotAskForBoundlessTime) {
+    GltfBuilder builder;
+    builder.add("accessors", R"({"componentType":5126,"count":900000,"type":"VEC3"})");
+    std::string targets = R"({"POSITION":0})", weights = "1";
+    for (int i = 0; i < 1000; ++i) {
+        targets += R"(,{"POSITION":0})";
+        weights += ",1";
+    }
+    const int mesh = builder.add(
+        "meshes",
+        fmt::format(R"({{"weights":[{}],"primitives":[{{"attributes":{{"POSITION":0}},"targets":[{}]}}]}})",
+                    weights, targets));
+    builder.add("nodes", fmt::format(R"({{"mesh":{}}})", mesh));
+    EXPECT_NE(builder.error().find("(kind 71"), std::string::npos) << builder.error();
+}
+
+/// The same tree of nodes costs by how often it refers to a mesh, not only by what the mesh holds.
+TEST(GltfFiles, ManyNodesWithManyPrimitivesCannotAskForBoundlessMemory) {
+    GltfBuilder builder = triangle_at_a_node();
+    std::string primitives = R"({"attributes":{"POSITION":0}})";
+    for (int i = 0; i < 2000; ++i) primitives += R"(,{"attributes":{"POSITION":0}})";
+    const int mesh = builder.add("meshes", fmt::format(R"({{"primitives":[{}]}})", primitives));
+    for (int i = 0; i < 50'000; ++i) builder.add("nodes", fmt::format(R"({{"mesh":{}}})", mesh));
+    EXPECT_NE(builder.error().find("(kind 71"), std::string::npos) << builder.error();
+}
+
+TEST(GltfFiles, WarningsOfABrokenFileAreFew) {
+    GltfBuilder builder = triangle_at_a_node();
+    std::string primitives = R"({"attributes":{}})";
+    for (int i = 0; i < 100'000; ++i) primitives += R"(,{"attributes":{}})";
+    const int mesh = builder.add("meshes", fmt::format(R"({{"primitives":[{}]}})", primitives));
+    builder.add("nodes", fmt::format(R"({{"mesh":{}}})", mesh));
+    const core::Scene scene = builder.load();
+    ASSERT_EQ(scene.warnings.size(), core::WarningList::kMost + 1);
+    EXPECT_NE(scene.warnings.back().find("more warnings"), std::string::npos);
+}
+
+TEST(GltfFiles, JsonThatWouldTakeTooMuchMemoryIsRefusedBeforeItIsBuilt) {
+    std::string text = R"({"asset":{"version":"2.0"},"extras":{"a":0)";
+    for (int i = 0; i < 3'000'000; ++i) text += R"(,"a":0)";
+    EXPECT_NE(tests::error_of_text(text + "}}").find("JSON would take more than"), std::string::npos);
+}
+
 TEST(GltfFiles, DeepJsonIsRefusedBeforeItIsBuilt) {
     const std::string deep = std::string(10000, '[') + std::string(10000, ']');
     EXPECT_NE(tests::error_of_text(R"({"asset":)" + deep + "}").find("nested more than 200"),
@@ -188,8 +274,11 @@ TEST(GltfFiles, DeepJsonIsRefusedBeforeItIsBuilt) {
 TEST(GltfFiles, OtherVersionsAndOtherFilesAreRefused) {
     EXPECT_NE(tests::error_of_text(R"({"asset":{"version":"1.0"}})").find("is '1.0'; 2.x is read"),
               std::string::npos);
-    EXPECT_NE(tests::error_of_text("[]").find("must be a JSON object"), std::string::npos);
-    EXPECT_NE(tests::error_of_text("").find("not valid JSON"), std::string::npos);
+    for (const char* other : {"", "[]", "gl", "solid cube"}) {
+        EXPECT_NE(tests::error_of_text(other).find("begins neither with 'glTF'"), std::string::npos) << other;
+    }
+    EXPECT_NE(tests::error_of_text("{").find("not valid JSON: parse error at line 1"), std::string::npos)
+        << tests::error_of_text("{");
     EXPECT_NE(error_of_file("no/such/scene.gltf").find("(kind 66"), std::string::npos);
 }
 

@@ -115,6 +115,17 @@ TEST(GltfMaterials, TexturesOnlyOneMaterialNeedsAreDecodedOnce) {
     EXPECT_EQ(scene.materials[1].normal_scale, 2.0f);
 }
 
+TEST(GltfMaterials, TextureCoordinatesThatAMeshLacksAreWarnedOf) {
+    GltfBuilder builder;
+    builder.add_texture(1, 1, {0, 0, 0, 0});
+    builder.add("materials", R"({"name":"brick","emissiveTexture":{"index":0,"texCoord":1}})");
+    const int mesh = builder.add_triangle_mesh(R"("material":0)");
+    builder.add("nodes", fmt::format(R"({{"mesh":{}}})", mesh));
+    const core::Scene scene = builder.load();
+    ASSERT_EQ(scene.warnings.size(), 1u);
+    EXPECT_NE(scene.warnings[0].find("'brick' needs TEXCOORD_1"), std::string::npos) << scene.warnings[0];
+}
+
 TEST(GltfMaterials, TextureCoordinatesPastTheSecondSetAreLeftOutWithAWarning) {
     GltfBuilder builder;
     builder.add_texture(1, 1, {0, 0, 0, 0});
