@@ -9,6 +9,7 @@
 #include "cli/flag_hints.h"
 #include "cli/options.h"
 #include "core/support/error.h"
+#include "core/support/memory.h"
 
 namespace {
 
@@ -28,6 +29,7 @@ int main(int argc, char** argv) {
     cli::Program program;
     program.arguments.assign(argv + 1, argv + argc);
     cli::install_signal_handlers();
+    cli::install_memory_handler();
 
     CLI::App app{"A ray tracer on signed distance fields, judged by a path tracer on triangles.",
                  "fieldlight"};
@@ -55,7 +57,9 @@ int main(int argc, char** argv) {
     } catch (const core::Interrupted&) {
         return fail(cli::stop_exit_code(), "stopped; no unfinished file is left");
     } catch (const std::bad_alloc&) {
-        return fail(kExitOutOfMemory, "out of memory");
+        core::lift_memory_limit();
+        std::fputs(cli::kOutOfMemoryMessage, stderr);
+        return kExitOutOfMemory;
     } catch (const std::exception& error) {
         return fail(kExitInternal, fmt::format("internal error: {}", error.what()).c_str());
     }

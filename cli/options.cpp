@@ -6,12 +6,20 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
+#include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
+#include <limits>
 #include <memory>
 #include <mutex>
+#include <new>
+#include <system_error>
 
+#include "core/support/error.h"
+#include "core/support/memory.h"
 #include "core/support/parallel.h"
 
 namespace cli {
@@ -50,10 +58,35 @@ void add_common_options(CLI::App& verb, CommonOptions& options) {
                     "Threads; 0 is one a core; the pixels are the same at any count")
         ->check(CLI::Range(0, 1024))
         ->capture_default_str();
+    verb.add_option_function<std::string>(
+            "--max-memory",
+            [&options](const std::string& text) { options.max_memory_bytes = *parse_memory_size(text); },
+            "Bytes that the program may take, such as 512M or 4G; past them it ends with exit code 71")
+        ->check([](const std::string& text) {
+            return parse_memory_size(text)
+                       ? std::string()
+                       : fmt::format("takes bytes, such as 512M, 4G or 1000000000, not '{}'", text);
+        })
+        ->type_name("BYTES");
     verb.add_flag("--allow-external", options.allow_external, "Let a scene's URIs leave its folder");
 }
 
+std::optional<std::uint64_t> parse_memory_size(std::string_view text) {
+    constexpr std::string_view kUnits = "KMGT";
+    std::uint64_t value = 0;
+    const char* end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc() || value == 0) return std::nullopt;
+    if (rest == end) return value;
+    const std::size_t unit = kUnits.find(static_cast<char>(std::toupper(static_cast<unsigned char>(*rest))));
+    if (unit == std::string_view::npos || rest + 1 != end) return std::nullopt;
+    const unsigned shift = 10 * (static_cast<unsigned>(unit) + 1);
+    if (value > std::numeric_limits<std::uint64_t>::max() >> shift) return std::nullopt;
+    return value << shift;
+}
+
 void run_verb(Program& program, const std::function<void()>& work) {
+    if (program.common.max_memory_bytes > 0) core::limit_memory(program.common.max_memory_bytes);
     core::with_thread_limit(program.common.threads, work);
 }
 
@@ -86,6 +119,37 @@ core::Progress make_progress(const Program& program) {
         std::fprintf(stderr, "\r%s%s", line.c_str(), fraction >= 1.0 ? "\n" : "");
         std::fflush(stderr);
     };
+}
+
+namespace {
+
+/// Whether the exception on its way out says that memory is short: the heap's, or a thread's that the system
+/// refuses to start.
+bool is_out_of_memory() {
+    try {
+        throw;
+    } catch (const std::bad_alloc&) {
+        return true;
+    } catch (const std::system_error& error) {
+        return error.code() == std::errc::resource_unavailable_try_again ||
+               error.code() == std::errc::not_enough_memory;
+    } catch (...) {
+        return false;
+    }
+}
+
+[[noreturn]] void on_terminate() {
+    if (std::current_exception() && is_out_of_memory()) {
+        std::fputs(kOutOfMemoryMessage, stderr);
+        std::_Exit(static_cast<int>(core::ErrorKind::kOutOfMemory));
+    }
+    std::abort();
+}
+
+}  // namespace
+
+void install_memory_handler() {
+    std::set_terminate(on_terminate);
 }
 
 core::StopRequested stop_flag() {

@@ -4,7 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/support/progress.h"
@@ -13,12 +15,17 @@ namespace cli {
 
 /// Flags that every verb takes.
 struct CommonOptions {
-    bool json = false;            ///< One JSON object on stdout.
-    bool quiet = false;           ///< Nothing on stderr but errors.
-    std::uint64_t seed = 0;       ///< Of all random numbers.
-    int threads = 0;              ///< 0: one a core.
-    bool allow_external = false;  ///< glTF URIs may leave the scene's folder.
+    bool json = false;                   ///< One JSON object on stdout.
+    bool quiet = false;                  ///< Nothing on stderr but errors.
+    std::uint64_t seed = 0;              ///< Of all random numbers.
+    int threads = 0;                     ///< 0: one a core.
+    bool allow_external = false;         ///< glTF URIs may leave the scene's folder.
+    std::uint64_t max_memory_bytes = 0;  ///< 0: as much as the system gives.
 };
+
+/// What stderr says where an allocation failed.
+inline constexpr const char* kOutOfMemoryMessage =
+    "fieldlight: out of memory; --max-memory, ulimit or the machine allow no more\n";
 
 /// State of one run of the program.
 struct Program {
@@ -30,7 +37,10 @@ struct Program {
 /// Declares the common flags on a verb.
 void add_common_options(CLI::App& verb, CommonOptions& options);
 
-/// Runs a verb's work under the common flags (thread limit, log level).
+/// Bytes of "512M", "4G" or plain bytes; K, M, G and T are powers of 1024. Nothing if it is none of these.
+std::optional<std::uint64_t> parse_memory_size(std::string_view text);
+
+/// Runs a verb's work under the common flags (limits on memory and threads).
 void run_verb(Program& program, const std::function<void()>& work);
 
 /// A warning or a note for the person at the terminal, on stderr; silent under --quiet.
@@ -43,6 +53,10 @@ core::Progress make_progress(const Program& program);
 
 /// Polled by long loops; true after SIGINT or SIGTERM.
 core::StopRequested stop_flag();
+
+/// Ends the program with 71 instead of an abort where memory runs out in a place that cannot fail, such as a
+/// thread of a library; with the message that main gives.
+void install_memory_handler();
 
 /// The exit code of a signal that asked for the stop: 130 for SIGINT, 143 for SIGTERM.
 int stop_exit_code();

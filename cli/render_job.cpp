@@ -11,6 +11,7 @@
 #include "core/render/path_tracer.h"
 #include "core/support/atomic_file.h"
 #include "core/support/error.h"
+#include "core/support/memory.h"
 #include "core/support/parallel.h"
 
 namespace cli {
@@ -109,8 +110,22 @@ core::ExrAttributes picture_attributes(const RenderOptions& options, const core:
     return attributes;
 }
 
+namespace {
+
+/// The picture's size is the caller's choice alone, so it is weighed before anything else is done.
+void require_picture_memory(const RenderOptions& options) {
+    const int width = options.crop.width > 0 ? options.crop.width : options.width;
+    const int height = options.crop.width > 0 ? options.crop.height : options.height;
+    core::require_memory(core::PathTracer::picture_bytes(width, height, options.aovs),
+                         fmt::format("'{}': a picture of {} x {} pixels with {} layers",
+                                     options.output.string(), width, height, options.aovs.size()));
+}
+
+}  // namespace
+
 nlohmann::json run_render(const Program& program, const RenderOptions& options) {
     StageClock clock;
+    require_picture_memory(options);
     const core::Scene scene = load_scene(program, options.scene);
     const core::Camera camera =
         choose_camera(program, options.scene, scene, static_cast<double>(options.width) / options.height);

@@ -14,6 +14,12 @@ sdf::BakeResult bake_fields(const Program& program, const core::Scene& scene,
                             const sdf::BakeSettings& settings, const std::filesystem::path& folder) {
     sdf::BakeResult result = sdf::bake_scene(scene, settings, folder, make_progress(program), stop_flag());
     if (stop_flag()()) throw core::Interrupted();  // The bake ends early and says nothing.
+    // A mesh that cannot be baked is stated; a picture that lacks what memory had no room for is none.
+    for (const sdf::MeshBake& mesh : result.meshes) {
+        if (mesh.error && mesh.error->kind() == core::ErrorKind::kOutOfMemory) {
+            throw core::InputError(*mesh.error);
+        }
+    }
     for (const std::string& missing : missing_meshes(result)) warn(program, missing);
     for (const sdf::MeshBake& mesh : result.meshes) {
         if (mesh.error) continue;

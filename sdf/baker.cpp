@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <new>
 
 #include "core/support/hash.h"
 #include "core/support/parallel.h"
@@ -228,14 +229,20 @@ BakeResult bake_scene(const core::Scene& scene, const BakeSettings& settings, co
             MeshBake& bake = result.meshes[i];
             if (stop && stop()) return;
             const auto mesh_start = std::chrono::steady_clock::now();
+            const auto fail_alone = [&](core::ErrorKind kind, const char* reason) {
+                bake.grid = nullptr;
+                bake.file.clear();
+                bake.error =
+                    core::InputError(kind, fmt::format("'{}': mesh '{}': {}", scene.name, bake.name, reason));
+            };
             try {
                 bake_one(scene, settings, folder, bake);
             } catch (const core::InputError& error) {
                 if (!is_about_mesh(error)) throw;
-                bake.grid = nullptr;
-                bake.file.clear();
-                bake.error = core::InputError(
-                    error.kind(), fmt::format("'{}': mesh '{}': {}", scene.name, bake.name, error.what()));
+                fail_alone(error.kind(), error.what());
+            } catch (const std::bad_alloc&) {
+                fail_alone(core::ErrorKind::kOutOfMemory,
+                           "memory ran out while its field was made; a coarser one needs less");
             }
             bake.seconds = seconds_since(mesh_start);
             const std::lock_guard lock(progress_mutex);

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/support/error.h"
+#include "core/support/memory.h"
 #include "core/support/parallel.h"
 #include "sdf/bake_error.h"
 #include "sdf/band.h"
@@ -235,6 +236,16 @@ void describe_drops(const CleanMesh& mesh, std::vector<std::string>& warnings) {
     say(mesh.duplicate_count, "the same three vertices as another face");
 }
 
+/// What the samples take at least: a surface passes through no fewer leaves than its area has leaf faces, but
+/// through no more than there are in the box (pieces may lie on one another).
+std::uint64_t least_field_bytes(const std::vector<Triangle>& corners, const glm::dvec3& extent_voxels) {
+    double area = 0.0;
+    for (const Triangle& triangle : corners) area += 0.5 * glm::length(triangle.scaled_normal());
+    const glm::dvec3 leaves = extent_voxels / static_cast<double>(kLeafSide) + 2.0;
+    const double count = std::min(area / (kLeafSide * kLeafSide), leaves.x * leaves.y * leaves.z);
+    return static_cast<std::uint64_t>(count) * sizeof(FieldLeaf);
+}
+
 }  // namespace
 
 std::string_view class_name(MeshClass value) {
@@ -283,6 +294,8 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
 
     Sources sources;
     sources.corners = corners_in_voxels(clean, info.origin, h);
+    core::require_memory(least_field_bytes(sources.corners, extent / h),
+                         fmt::format("a field of {:.0f} voxels along its longest side", longest / h));
     const std::vector<Component> components =
         classify_components(clean, sources.corners, options.surface_class);
     build_sources(components, sources);

@@ -33,8 +33,8 @@ glm::dvec3 usable_extent(const MeshView& mesh);
 
 /// Bakes `mesh`. The same samples come out at any thread count. Leaves `source_hash` and `settings_hash`
 /// empty: they are the caller's.
-/// @throws core::InputError kBadData if no usable triangle is left or the lattice would be absurdly large;
-/// the message does not name the mesh.
+/// @throws core::InputError kBadData if no usable triangle is left or the lattice would be absurdly large,
+/// kOutOfMemory if the samples cannot fit; the message does not name the mesh.
 SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options);
 
 }  // namespace sdf

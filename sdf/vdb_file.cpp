@@ -11,6 +11,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <new>
 #include <sstream>
 
 #include "core/support/atomic_file.h"
@@ -59,6 +60,11 @@ void with_open_file(const fs::path& path, const std::function<void(openvdb::io::
         file.close();
     } catch (const core::InputError&) {
         throw;
+    } catch (const std::bad_alloc&) {
+        throw core::InputError(
+            core::ErrorKind::kOutOfMemory,
+            fmt::format("'{}': takes more memory than there is, or is damaged and asks for it",
+                        path.string()));
     } catch (const std::exception& error) {
         fail(path, fmt::format("not a whole .vdb file ({})", error.what()));
     }
@@ -166,6 +172,8 @@ void write_field(const fs::path& path, const SampledField& field, const std::str
             file.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
             file.write({distance, triangle});
             file.close();
+        } catch (const std::bad_alloc&) {
+            throw;
         } catch (const std::exception& error) {
             throw core::InputError(core::ErrorKind::kInputOutput,
                                    fmt::format("'{}': cannot be written ({})", path.string(), error.what()));

@@ -34,6 +34,7 @@
 #include "core/support/atomic_file.h"
 #include "core/support/error.h"
 #include "core/support/file_bytes.h"
+#include "core/support/memory.h"
 
 namespace core {
 
@@ -249,6 +250,8 @@ Image read_planes(Imf::InputFile& file, const ExrInfo& info, const std::string& 
     std::vector<std::vector<float>> planes(names.size());
     Imf::FrameBuffer frame_buffer;
     const auto width = static_cast<std::size_t>(info.width), height = static_cast<std::size_t>(info.height);
+    require_memory(sizeof(float) * width * height * names.size(),
+                   fmt::format("'{}': {} x {} pixels of {} channels", name, width, height, names.size()));
     for (std::size_t i = 0; i < names.size(); ++i) {
         planes[i].resize(width * height);
         frame_buffer.insert(
@@ -274,6 +277,8 @@ Image read_luminance_chroma(Imf::IStream& stream, const ExrInfo& info, const std
                         name, channel.name));
     }
     const auto width = static_cast<std::size_t>(info.width), height = static_cast<std::size_t>(info.height);
+    require_memory((sizeof(Imf::Rgba) + 4 * sizeof(float)) * width * height,
+                   fmt::format("'{}': {} x {} pixels", name, width, height));
     std::vector<Imf::Rgba> pixels(width * height);
     stream.seekg(0);
     Imf::RgbaInputFile file(stream);

@@ -13,6 +13,7 @@
 
 #include "core/support/error.h"
 #include "core/support/file_bytes.h"
+#include "core/support/memory.h"
 
 namespace core {
 
@@ -42,6 +43,8 @@ public:
         read_header();
         read_resolution();
         Image image(width_, height_);
+        require_memory(3 * sizeof(float) * image.pixel_count(),
+                       fmt::format("'{}': {} x {} pixels", name_, width_, height_));
         std::array<std::vector<float>, 3> planes;
         for (std::vector<float>& plane : planes) plane.resize(image.pixel_count());
         std::vector<Rgbe> scanline(static_cast<std::size_t>(width_));

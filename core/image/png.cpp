@@ -11,6 +11,7 @@
 
 #include "core/support/atomic_file.h"
 #include "core/support/error.h"
+#include "core/support/memory.h"
 
 namespace core {
 
@@ -33,6 +34,10 @@ std::string encode_png(int width, int height, std::span<const std::uint8_t> rgb)
     assert(width > 0 && height > 0);
     assert(rgb.size() == std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
     assert(is_encodable(height, rgb));
+    // stb ends the program where its buffers cannot grow: the filtered rows, the deflated ones, which double
+    // as they grow, its hash table, and the file twice.
+    constexpr std::uint64_t kHashTableBytes = 8 << 20;
+    require_memory(4 * rgb.size() + kHashTableBytes, fmt::format("a PNG of {} x {} pixels", width, height));
     std::string encoded;
     if (stbi_write_png_to_func(append, &encoded, width, height, 3, rgb.data(), 3 * width) == 0)
         throw std::bad_alloc();

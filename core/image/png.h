@@ -10,6 +10,7 @@ namespace core {
 
 /// The bytes of a PNG file of an opaque 8-bit RGB picture, top row first.
 /// @pre rgb.size() == 3 * width * height > 0, less than 2^31 bytes with one more a row
+/// @throws InputError kOutOfMemory
 std::string encode_png(int width, int height, std::span<const std::uint8_t> rgb);
 
 /// Writes an opaque 8-bit RGB picture atomically, top row first.

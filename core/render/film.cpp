@@ -4,11 +4,27 @@
 
 namespace core {
 
+namespace {
+
+bool needs_auxiliary(const std::set<std::string>& layers) {
+    return std::any_of(layers.begin(), layers.end(),
+                       [](const std::string& layer) { return layer != "Variance"; });
+}
+
+}  // namespace
+
+std::uint64_t Film::bytes(int width, int height, int batch_count, const std::set<std::string>& layers) {
+    // Beauty, alpha and the mean they are developed from; a layer is a colour at most.
+    const std::uint64_t developed = sizeof(float) * (7 + 3 * layers.size());
+    const std::uint64_t summed = sizeof(glm::vec3) * static_cast<std::uint64_t>(batch_count) +
+                                 sizeof(std::uint32_t) + (needs_auxiliary(layers) ? sizeof(Auxiliary) : 0);
+    return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) * (developed + summed);
+}
+
 Film::Film(int width, int height, int batch_count, const std::set<std::string>& layers)
     : width_(width), height_(height), batch_count_(batch_count), layers_(layers) {
     const std::size_t pixel_count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-    auxiliary_ = std::any_of(layers.begin(), layers.end(),
-                             [](const std::string& layer) { return layer != "Variance"; });
+    auxiliary_ = needs_auxiliary(layers);
     radiance_.resize(pixel_count * static_cast<std::size_t>(batch_count), glm::vec3(0.0f));
     hit_count_.resize(pixel_count, 0);
     if (auxiliary_) sums_.resize(pixel_count);

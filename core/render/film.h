@@ -31,6 +31,9 @@ public:
     /// @param layers beside the beauty; names as in PathTracer.
     Film(int width, int height, int batch_count, const std::set<std::string>& layers);
 
+    /// Memory that the same film and the picture developed from it take.
+    static std::uint64_t bytes(int width, int height, int batch_count, const std::set<std::string>& layers);
+
     /// True if only the beauty is wanted: then `radiance` and `hit` of a sample are enough.
     bool beauty_only() const { return !auxiliary_; }
 

@@ -92,6 +92,10 @@ glm::vec2 vertex_point(const Path& path, int vertex, VertexDimension use) {
                                         : path.sequence.independent_point(dimension);
 }
 
+int batch_count(const std::set<std::string>& aovs) {
+    return aovs.count("Variance") ? PathTracer::kBatchCount : 1;
+}
+
 /// Everything that is the same for all tiles of a picture.
 class Job {
 public:
@@ -102,7 +106,7 @@ public:
           scene_(inputs.scene),
           lights_(inputs.scene),
           camera_(inputs.camera, inputs.width, inputs.height),
-          batch_count_(inputs.aovs.count("Variance") ? PathTracer::kBatchCount : 1),
+          batch_count_(batch_count(inputs.aovs)),
           film_(crop.width, crop.height, batch_count_, inputs.aovs) {
         start_offsets_.resize(scene_.instances.size());
         for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
@@ -449,6 +453,10 @@ void check_layers(const std::set<std::string>& layers, int samples_per_pixel) {
 }
 
 }  // namespace
+
+std::uint64_t PathTracer::picture_bytes(int width, int height, const std::set<std::string>& aovs) {
+    return Film::bytes(width, height, batch_count(aovs), aovs);
+}
 
 Frame PathTracer::render(const RenderInputs& inputs) {
     check_layers(inputs.aovs, settings_.samples_per_pixel);

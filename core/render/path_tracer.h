@@ -39,6 +39,9 @@ public:
     /// @throws Interrupted when asked to stop.
     Frame render(const RenderInputs& inputs) override;
 
+    /// Memory that a picture and its layers take. @param width, height of the crop
+    static std::uint64_t picture_bytes(int width, int height, const std::set<std::string>& aovs);
+
 private:
     PathTracerSettings settings_;
 };

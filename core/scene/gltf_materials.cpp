@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "core/support/memory.h"
 #include "core/support/parallel.h"
 
 namespace core {
@@ -291,6 +292,7 @@ private:
     /// Counts what the images unpack to beyond what files of their size usually do.
     void charge_images() {
         constexpr std::size_t kUsualExpansion = 64;
+        std::uint64_t all_decoded = 0;
         for (const ImageSource& source : images_) {
             if (source.glossiness) continue;
             const std::vector<std::uint8_t> encoded = document_.read_image(source.gltf_image);
@@ -300,7 +302,9 @@ private:
             const std::size_t usual = kUsualExpansion * encoded.size();
             document_.charge_memory(decoded > usual ? decoded - usual : 0, 1,
                                     document_.element("images", source.gltf_image));
+            all_decoded += decoded;
         }
+        require_memory(all_decoded, fmt::format("'{}': {} textures", document_.file_name(), images_.size()));
     }
 
     void load_images() {

@@ -8,11 +8,10 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <new>
-#include <string_view>
 
 #include "core/image/tonemap.h"
 #include "core/support/error.h"
+#include "core/support/memory.h"
 
 namespace core {
 
@@ -89,6 +88,14 @@ glm::vec4 texel(const TextureImage& image, int x, int y, const std::array<float,
     return {color_table[rgba[0]], color_table[rgba[1]], color_table[rgba[2]], kUnitFromByte[rgba[3]]};
 }
 
+/// Asks for what decoding takes at its peak: rows before and after filtering, the four channels, and tables.
+void require_texture_memory(const glm::ivec2& size, const std::string& name) {
+    constexpr std::uint64_t kBytesPerTexel = 12, kTables = 1 << 20;
+    require_memory(
+        kBytesPerTexel * static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) + kTables,
+        fmt::format("image '{}' of {} x {} texels", name, size.x, size.y));
+}
+
 /// Grey in all colours where there is one channel or two; opaque where there is no alpha.
 std::vector<std::uint8_t> with_four_channels(const std::uint8_t* pixels, int channel_count,
                                              std::size_t pixel_count) {
@@ -138,6 +145,7 @@ glm::ivec2 texture_image_size(std::span<const std::uint8_t> encoded, const std::
 
 TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const std::string& name) {
     const glm::ivec2 size = texture_image_size(encoded, name);
+    require_texture_memory(size, name);
     TextureImage image;
     image.name = name;
     image.width = size.x;
@@ -149,8 +157,9 @@ TextureImage decode_texture_image(std::span<const std::uint8_t> encoded, const s
                               &channel_count, 0),
         stbi_image_free);
     if (!pixels) {
-        const std::string_view reason = stbi_failure_reason();
-        if (reason == "outofmem") throw std::bad_alloc();
+        // stb takes what it had no memory for to be another format, and gives that format's reason.
+        const std::string reason = stbi_failure_reason();
+        require_texture_memory(size, name);
         refuse(name, fmt::format("cannot be decoded ({})", reason));
     }
     image.rgba = with_four_channels(pixels.get(), channel_count,

@@ -6,23 +6,49 @@
 #include <tbb/task_arena.h>
 #include <xmmintrin.h>
 
+#include <atomic>
 #include <cassert>
+#include <chrono>
+#include <string>
+#include <thread>
 
 #if defined(__SANITIZE_THREAD__)
 #include <algorithm>
-#include <atomic>
 #include <exception>
 #include <mutex>
-#include <thread>
 #include <utility>
 #include <vector>
 #endif
+
+#include "core/support/memory.h"
 
 namespace core {
 
 namespace {
 
 constexpr unsigned int kFlushToZeroAndDenormalsAreZero = 0x8040;
+
+/// What a thread takes when it starts: its stack and what oneTBB and the C library keep for it.
+constexpr std::size_t kBytesPerThread = std::size_t{9} << 20;
+
+/// Starts all threads of this arena now. oneTBB starts them when work comes and ends the program where the
+/// system refuses one, so under a limit on memory they must stand before memory runs out.
+void start_threads(int thread_count) {
+    require_memory(static_cast<std::uint64_t>(thread_count) * kBytesPerThread,
+                   std::to_string(thread_count) + " threads (--threads)");
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(1);
+    std::atomic<int> arrived{0};
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, thread_count, 1),
+        [&](const tbb::blocked_range<int>&) {
+            ++arrived;
+            // Each thread holds one of the ranges until all are held, or none comes any more.
+            while (arrived < thread_count && std::chrono::steady_clock::now() < deadline) {
+                std::this_thread::yield();
+            }
+        },
+        tbb::simple_partitioner());
+}
 
 }  // namespace
 
@@ -72,13 +98,17 @@ void parallel_for(std::size_t count, std::size_t grain,
 
 void with_thread_limit(int thread_count, const std::function<void()>& work) {
     if (thread_count <= 0) {
+        if (memory_is_limited()) start_threads(thread_limit());
         work();
         return;
     }
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(thread_count));
     tbb::task_arena arena(thread_count);
-    arena.execute(work);
+    arena.execute([&] {
+        if (memory_is_limited()) start_threads(thread_count);
+        work();
+    });
 }
 
 int thread_limit() {

@@ -16,7 +16,8 @@ void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
 
 /// Runs `work` with at most `thread_count` threads for everything below it, libraries that share oneTBB
-/// (OpenVDB, Embree) included. More threads than cores are honoured. 0 means one a core.
+/// (OpenVDB, Embree) included. More threads than cores are honoured. 0 means one a core. Under a limit on
+/// memory all threads are started first. @throws InputError kOutOfMemory where they do not fit
 void with_thread_limit(int thread_count, const std::function<void()>& work);
 
 /// Threads that parallel_for would use here.

@@ -251,10 +251,15 @@ void TriangleTracer::Impl::create_device(const TriangleTracerOptions& options) {
     if (!options.instruction_set.empty()) configuration += ",isa=" + options.instruction_set;
     device.reset(rtcNewDevice(configuration.c_str()));
     if (!device) {
+        const RTCError error = rtcGetDeviceError(nullptr);
+        if (error == RTC_ERROR_OUT_OF_MEMORY) {
+            throw InputError(ErrorKind::kOutOfMemory,
+                             fmt::format("'{}': not enough memory to start the triangle tracer", scene.name));
+        }
         throw InputError(ErrorKind::kUsage,
                          fmt::format("Embree cannot start with instruction set '{}' on this processor (error "
                                      "{}); use one that it has, or none for the best",
-                                     options.instruction_set, static_cast<int>(rtcGetDeviceError(nullptr))));
+                                     options.instruction_set, static_cast<int>(error)));
     }
     rtcSetDeviceMemoryMonitorFunction(
         device.get(),

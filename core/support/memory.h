@@ -1,0 +1,32 @@
+// core/support/memory.h: a limit on this process's memory that the system itself enforces.
+//
+// Past the limit every allocation fails, in libraries too, so that the run ends with a message instead of in
+// the system's hands. Where much is about to be taken, require_memory asks first and can say what for.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace core {
+
+/// Limits the private memory of this process (RLIMIT_DATA: heap, thread stacks, anonymous maps; not the
+/// program's code). Call it before threads are started.
+/// @throws InputError kOutOfMemory where the process already uses as much; kUsage in a build whose sanitizer
+/// reserves memory in advance and cannot run under a limit
+void limit_memory(std::uint64_t bytes);
+
+/// Opens the limit again, as far as the system lets, so that there is room to say that it was met.
+void lift_memory_limit() noexcept;
+
+/// Whether a limit was set, here or by whoever started the program (ulimit).
+bool memory_is_limited();
+
+/// Bytes that this process may still take: up to its limits or, where there are none, the machine's memory.
+std::uint64_t memory_left();
+
+/// Asks before memory is taken.
+/// @param what needs it, as in "the picture of 8000 x 8000 pixels"
+/// @throws InputError kOutOfMemory naming `what`, what it needs and what is left
+void require_memory(std::uint64_t bytes, const std::string& what);
+
+}  // namespace core
