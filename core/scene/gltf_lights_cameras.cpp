@@ -75,8 +75,8 @@ Camera read_camera(const JsonElement& element, const JsonElement& node, const gl
     return camera;
 }
 
-Light read_light(const GltfDocument& document, const JsonElement& reference, const JsonElement& node,
-                 const glm::dmat4& world_from_node) {
+std::optional<Light> read_light(GltfDocument& document, const JsonElement& reference, const JsonElement& node,
+                                const glm::dmat4& world_from_node) {
     const auto extension = document.root().extension("KHR_lights_punctual");
     if (!extension) reference.fail("the file itself has no KHR_lights_punctual with lights");
     const JsonElement lights = extension->require("lights");
@@ -99,7 +99,10 @@ Light read_light(const GltfDocument& document, const JsonElement& reference, con
     const glm::vec3 direction(unit_direction(-glm::dvec3(world_from_node[2]), node));
     if (type == "directional") return DirectionalLight{name, direction, colored_intensity, 0.0f};
     if (type != "spot") {
-        element.fail(fmt::format("type '{}' is none of point, spot, directional", type));
+        document.warn_once(
+            fmt::format("{}: type '{}' is none of point, spot, directional; the light is left out",
+                        element.path(), type));
+        return std::nullopt;
     }
     double inner = 0.0;
     double outer = kPi / 4.0;
@@ -113,6 +116,9 @@ Light read_light(const GltfDocument& document, const JsonElement& reference, con
                             "<= pi / 2",
                             inner, outer));
         }
+    } else {
+        document.warn_once(
+            fmt::format("{}: 'spot' is missing; its cone has the default angles", element.path()));
     }
     SpotLight light;
     light.name = name;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <optional>
 
 #include "core/scene/camera.h"
 #include "core/scene/gltf_document.h"
@@ -13,9 +14,10 @@ namespace core {
 /// @throws InputError for a field of view or magnification that shows nothing.
 Camera read_camera(const JsonElement& camera, const JsonElement& node, const glm::dmat4& world_from_node);
 
-/// The light that a node's KHR_lights_punctual refers to. It shines along the node's -Z.
-/// @throws InputError for an unknown type, negative intensity, cones out of order.
-Light read_light(const GltfDocument& document, const JsonElement& reference, const JsonElement& node,
-                 const glm::dmat4& world_from_node);
+/// The light that a node's KHR_lights_punctual refers to. It shines along the node's -Z. Nothing, with a
+/// warning, for a type that the extension does not know.
+/// @throws InputError for negative intensity, cones out of order.
+std::optional<Light> read_light(GltfDocument& document, const JsonElement& reference, const JsonElement& node,
+                                const glm::dmat4& world_from_node);
 
 }  // namespace core

@@ -205,8 +205,10 @@ private:
             scene_.cameras.back().node = index;
         }
         if (const auto light = node.extension("KHR_lights_punctual")) {
-            scene_.lights.push_back(read_light(document_, *light, node, world_from_node));
-            std::visit([&](auto& placed) { placed.node = index; }, scene_.lights.back());
+            if (auto read = read_light(document_, *light, node, world_from_node)) {
+                std::visit([&](auto& placed) { placed.node = index; }, *read);
+                scene_.lights.push_back(*std::move(read));
+            }
         }
     }
 

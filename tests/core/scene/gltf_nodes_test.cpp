@@ -226,6 +226,18 @@ TEST(GltfNodes, LightsShineAlongTheNodesMinusZ) {
     EXPECT_FLOAT_EQ(spot.cos_outer, static_cast<float>(std::cos(std::numbers::pi / 4)));
 }
 
+TEST(GltfNodes, ALightOfAnUnknownTypeIsLeftOutWithAWarning) {
+    GltfBuilder builder;
+    builder.set("extensions", R"({"KHR_lights_punctual":{"lights":[{"type":"sphere"},{"type":"spot"}]}})");
+    builder.add("nodes", R"({"extensions":{"KHR_lights_punctual":{"light":0}}})");
+    builder.add("nodes", R"({"extensions":{"KHR_lights_punctual":{"light":1}}})");
+    const core::Scene scene = builder.load();
+    EXPECT_EQ(scene.lights.size(), 1u);
+    ASSERT_EQ(scene.warnings.size(), 2u);
+    EXPECT_NE(scene.warnings[0].find("type 'sphere' is none of"), std::string::npos);
+    EXPECT_NE(scene.warnings[1].find("'spot' is missing"), std::string::npos);
+}
+
 TEST(GltfNodes, ALightThatIsNotThereIsRefused) {
     GltfBuilder builder;
     builder.set("extensions", R"({"KHR_lights_punctual":{"lights":[{"type":"point"}]}})");
