@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/scene/gltf_accessors.h"
+#include "core/support/error.h"
 
 namespace core {
 
@@ -204,7 +205,14 @@ private:
 std::vector<Animation> load_animations(GltfDocument& document, const std::vector<Node>& nodes) {
     std::vector<Animation> animations;
     for (std::size_t i = 0; i < document.count("animations"); ++i) {
-        animations.push_back(AnimationReader(document, nodes, document.element("animations", i)).read());
+        try {
+            animations.push_back(AnimationReader(document, nodes, document.element("animations", i)).read());
+        } catch (const InputError& error) {
+            if (error.kind() == ErrorKind::kOutOfMemory) throw;
+            // The scene at rest does not need it, as it does not need a broken buffer that nothing drawn
+            // uses.
+            document.warn_once(fmt::format("an animation is left out: {}", error.what()));
+        }
     }
     return animations;
 }

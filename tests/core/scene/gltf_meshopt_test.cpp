@@ -304,7 +304,11 @@ TEST(GltfMeshopt, PlaceholdersHoldNothingForOtherViews) {
 TEST(GltfMeshopt, BuffersWithoutDataAreStillRefusedInOtherFiles) {
     GltfBuilder builder;
     builder.add_triangle_mesh();
-    builder.add("buffers", R"({"byteLength":4})");
+    builder.add("buffers", R"({"byteLength":36})");
+    const int view = builder.add("bufferViews", R"({"buffer":1,"byteLength":36})");
+    const int position = builder.add_accessor(view, GltfBuilder::kFloat, 3, "VEC3");
+    const int mesh = builder.add_mesh(fmt::format(R"({{"attributes":{{"POSITION":{}}}}})", position));
+    builder.add("nodes", fmt::format(R"({{"mesh":{}}})", mesh));
     EXPECT_NE(builder.error().find("buffers[1]: has no uri"), std::string::npos) << builder.error();
 }
 
