@@ -84,8 +84,9 @@ private:
     std::exception_ptr refusal_;
 };
 
-/// The counts that Draco's own decoder is about to believe. Draco Bitstream Specification 2.2, sections 4.3
-/// and 4.4 (sequential: faces, points) and 6 (edgebreaker: vertices, faces, attribute data).
+/// The counts that Draco's own decoder is about to believe. Google, "Draco Bitstream Specification", version
+/// 2.2: the sequential method begins with faces and points, edgebreaker with vertices, faces and the number of
+/// attribute sets that have seams.
 struct Counts {
     std::uint32_t faces = 0;
     std::uint32_t vertices = 0;
