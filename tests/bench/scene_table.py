@@ -11,32 +11,17 @@ render, or if one outside EXPECTED_DIFFERENCES does not pass.
 
 import argparse
 import json
-import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 
+from shared_scenes import add_shared_option, scene_files
+
 # Scenes that the fields of today cannot show as triangles do, each with what was seen in the pictures.
-EXPECTED_DIFFERENCES = {
-    "alpha_blend_mode_test": "cards are half a voxel thicker on each side, which shows where blended ones are seen edge-on",
-    "cornell_bevy": "its lamp hangs a fifth of a voxel under the ceiling and lies inside the ceiling's thickness",
-    "dutch_ship_medium": "ropes thinner than a voxel are as thick as one",
-    "irradiance_volume_bevy": "plates of a fifth of a voxel are thickened to be tight",
-    "sheen_cloth": "the cloth is seen half a voxel thicker along its outline",
-    "tree_godot": "leaf cards closer than a voxel merge",
-}
+EXPECTED_DIFFERENCES = {}
 
 ARGUMENTS = ["--size", "256x256", "--spp", "8", "--bounces", "2", "--quiet", "--resolution", "128"]
-
-
-def scene_files(scenes):
-    for folder in sorted(scenes.iterdir()):
-        if folder.name in ("invalid", "unsupported", "skies", "exr", "volumes", "LICENSES") or not folder.is_dir():
-            continue
-        files = sorted(list(folder.glob("*.gltf")) + list(folder.glob("*.glb")))
-        if files:
-            yield folder.name, files[0]
 
 
 def render(program, scene, output, kind):
@@ -60,15 +45,11 @@ def means(program, picture):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fieldlight", default="build/release/fieldlight")
-    parser.add_argument("--shared", default=os.environ.get("FIELDLIGHT_SHARED", "../shared"))
+    add_shared_option(parser)
     parser.add_argument("--only", help="one scene's folder name")
     parser.add_argument("--keep", help="folder to keep the pictures in")
     parser.add_argument("--json", help="write the rows to this file")
     options = parser.parse_args()
-    scenes = pathlib.Path(options.shared) / "scenes"
-    if not scenes.is_dir():
-        sys.exit(f"{scenes} is missing; set FIELDLIGHT_SHARED or --shared")
-
     rows, broken, outside = [], [], []
     print("| scene | coverage, triangles | coverage, fields | radiance, fields / triangles | bake s | render s, triangles | "
           "render s, fields | |")
@@ -76,7 +57,7 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(options.keep or temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        for name, scene in scene_files(scenes):
+        for name, scene in scene_files(options.shared):
             if options.only and name != options.only:
                 continue
             pictures = {kind: folder / f"{name}.{kind}.exr" for kind in ("triangle", "sdf")}
