@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -189,18 +189,19 @@ private:
     }
 
     std::string band(const PlotSeries& series) const {
-        std::string upper, lower;
-        std::size_t count = 0;
-        for (const PlotPoint& point : series.points) {
-            // Where noise of the reference hides the error, only the point at the bottom says so.
-            if (!(point.error > 0.0)) continue;
-            ++count;
-            upper += fmt::format("{:.1f},{:.1f} ", x_.at(point.cost), y_of(point.high));
-            lower = fmt::format("{:.1f},{:.1f} ", x_.at(point.cost), y_of(point.low)) + lower;
-        }
-        if (count < 2) return "";
-        return fmt::format("<polygon class=\"band {}\" points=\"{}{}\"/>\n",
-                           series_class(report_, series.index), upper, lower);
+        // Where noise of the reference hides the error, only the point at the bottom says so.
+        std::vector<PlotPoint> shown;
+        std::copy_if(series.points.begin(), series.points.end(), std::back_inserter(shown),
+                     [](const PlotPoint& point) { return point.error > 0.0; });
+        if (shown.size() < 2) return "";
+        std::string corners;
+        const auto add = [&](const PlotPoint& point, double error) {
+            corners += fmt::format("{:.1f},{:.1f} ", x_.at(point.cost), y_of(error));
+        };
+        for (const PlotPoint& point : shown) add(point, point.high);
+        std::for_each(shown.rbegin(), shown.rend(), [&](const PlotPoint& point) { add(point, point.low); });
+        return fmt::format("<polygon class=\"band {}\" points=\"{}\"/>\n",
+                           series_class(report_, series.index), corners);
     }
 
     /// The fit over wall time, else a line from point to point, and the floor.
