@@ -19,15 +19,6 @@ namespace {
 
 constexpr std::uint64_t kMebibyte = std::uint64_t{1} << 20;
 
-/// Runs `check` in a child, whose limits die with it. True if it ran and returned true.
-bool holds_in_child(const std::function<bool()>& check) {
-    const pid_t child = fork();
-    if (child == 0) _exit(check() ? 0 : 1);
-    int status = 0;
-    waitpid(child, &status, 0);
-    return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-}
-
 core::InputError error_of(const std::function<void()>& work) {
     try {
         work();
@@ -65,6 +56,15 @@ TEST(Memory, ALimitThatCannotBeKeptIsRefused) {
 
 // Sanitizers reserve terabytes in advance.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+/// Runs `check` in a child, whose limits die with it. True if it ran and returned true.
+bool holds_in_child(const std::function<bool()>& check) {
+    const pid_t child = fork();
+    if (child == 0) _exit(check() ? 0 : 1);
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
 
 TEST(Memory, PastTheLimitAllocationsFailAndLiftingOpensIt) {
     EXPECT_TRUE(holds_in_child([] {
