@@ -37,6 +37,26 @@ bool is_png(std::span<const std::uint8_t> bytes) {
     throw InputError(ErrorKind::kBadData, fmt::format("image '{}': {}", name, reason));
 }
 
+/// stb takes as much memory as a chunk claims to be long before it looks for its bytes.
+void check_png_chunks(std::span<const std::uint8_t> encoded, const std::string& name) {
+    constexpr std::size_t kSignature = 8;
+    constexpr std::size_t kChunkHeader = 8;
+    constexpr std::size_t kChecksum = 4;
+    std::size_t offset = kSignature;
+    while (offset <= encoded.size() && encoded.size() - offset >= kChunkHeader) {
+        const std::uint8_t* chunk = encoded.data() + offset;
+        const std::uint64_t length = std::uint64_t{chunk[0]} << 24 | std::uint64_t{chunk[1]} << 16 |
+                                     std::uint64_t{chunk[2]} << 8 | chunk[3];
+        const std::size_t left = encoded.size() - offset - kChunkHeader;
+        if (length > left) {
+            refuse(name, fmt::format("claims a chunk of {} bytes where {} are left; the file is damaged",
+                                     length, left));
+        }
+        if (std::equal(chunk + 4, chunk + 8, "IEND")) return;
+        offset += kChunkHeader + static_cast<std::size_t>(length) + kChecksum;
+    }
+}
+
 std::array<float, 256> make_srgb_table() {
     std::array<float, 256> table{};
     for (int code = 0; code < 256; ++code) table[code] = linear_from_srgb(code / 255.0);
@@ -122,6 +142,7 @@ glm::ivec2 texture_image_size(std::span<const std::uint8_t> encoded, const std::
     if (encoded.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
         refuse(name, "holds more than 2^31 bytes");
     }
+    if (png) check_png_chunks(encoded, name);
     const int byte_count = static_cast<int>(encoded.size());
     int width = 0;
     int height = 0;

@@ -149,6 +149,10 @@ TEST(Texture, DamagedAndBoundlessImagesAreRefusedByName) {
     std::vector<std::uint8_t> lying = png;
     lying[18] = lying[22] = 16;
     EXPECT_NE(message(lying).find("claims 4097 x 4097"), std::string::npos) << message(lying);
+    // The length of the chunk after the header: bytes 33 to 36.
+    std::vector<std::uint8_t> endless = png;
+    endless[33] = 0x7e;
+    EXPECT_NE(message(endless).find("claims a chunk of 21139292"), std::string::npos) << message(endless);
 }
 
 }  // namespace
