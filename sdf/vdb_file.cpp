@@ -16,8 +16,10 @@
 
 #include "core/support/atomic_file.h"
 #include "core/support/error.h"
+#include "core/support/file_bytes.h"
 #include "core/support/hash.h"
 #include "sdf/feature_ranges.h"
+#include "sdf/vdb_scan.h"
 
 namespace sdf {
 
@@ -30,6 +32,8 @@ constexpr const char* kWriter = "fieldlight " FIELDLIGHT_VERSION " bake 3";
 
 constexpr const char* kDistanceGrid = "distance";
 constexpr const char* kTriangleGrid = "triangle";
+
+constexpr std::uint64_t kMostFileBytes = std::uint64_t{1} << 34;
 
 /// Lattice coordinates beyond this do not come from a bake.
 constexpr int kFarthestLattice = kMostVoxelsAlongSide / 2 + 4 * kLeafSide;
@@ -45,13 +49,10 @@ void initialize_openvdb() {
     throw core::InputError(core::ErrorKind::kBadData, fmt::format("'{}': {}", path.string(), what));
 }
 
-/// Opens a file, hands it over, and gives whatever OpenVDB throws the file's name.
+/// Scans a file and opens it, hands it over, and gives whatever OpenVDB throws the file's name.
 void with_open_file(const fs::path& path, const std::function<void(openvdb::io::File&)>& work) {
     initialize_openvdb();
-    if (!fs::is_regular_file(path)) {
-        throw core::InputError(core::ErrorKind::kNoInput,
-                               fmt::format("'{}': no such file; a .vdb file is needed", path.string()));
-    }
+    scan_vdb(core::read_file_bytes(path, kMostFileBytes), path.string());
     try {
         openvdb::io::File file(path.string());
         // Delayed loading maps the file, and a truncated one would then kill the program at first touch.
