@@ -11,8 +11,11 @@
 #include "cli/inspect_exr.h"
 #include "cli/inspect_vdb.h"
 #include "cli/options.h"
+#include "cli/vdb_slice_picture.h"
+#include "core/image/png.h"
 #include "core/scene/scene_loader.h"
 #include "core/support/error.h"
+#include "sdf/vdb_file.h"
 
 namespace cli {
 
@@ -21,6 +24,9 @@ namespace {
 struct InspectOptions {
     std::string file;
     std::string scene;
+    std::string slice;       ///< PNG to draw a plane of a .vdb into; empty: none.
+    std::string axis = "z";  ///< The plane's normal.
+    double at = 0.5;         ///< Where along it.
 };
 
 std::string lower_case_extension(const std::filesystem::path& path) {
@@ -88,9 +94,26 @@ std::string describe_json(const nlohmann::json& value, int indent = 0) {
     return text;
 }
 
+/// Draws a plane of a field. Returns what the output says of it.
+nlohmann::json write_slice(const InspectOptions& options) {
+    const sdf::VdbSlice slice = sdf::read_vdb_slice(options.file, options.axis[0] - 'x', options.at);
+    const SlicePicture picture = draw_slice(slice);
+    core::write_png(options.slice, picture.width, picture.height, picture.rgb);
+    return {{"file", options.slice},      {"grid", slice.grid},     {"axis", options.axis},
+            {"position", slice.position}, {"width", picture.width}, {"height", picture.height}};
+}
+
 void inspect(const Program& program, const InspectOptions& options) {
     const std::filesystem::path path(options.file);
     const std::string extension = lower_case_extension(path);
+    if (!options.slice.empty() && extension != ".vdb") {
+        throw core::InputError(core::ErrorKind::kUsage,
+                               fmt::format("--slice: draws a .vdb; '{}' is none", options.file));
+    }
+    if (!options.slice.empty() && lower_case_extension(options.slice) != ".png") {
+        throw core::InputError(core::ErrorKind::kUsage,
+                               fmt::format("--slice {}: must end in .png", options.slice));
+    }
     nlohmann::json result;
     std::string text;
     if (core::is_scene_file(path)) {
@@ -104,6 +127,7 @@ void inspect(const Program& program, const InspectOptions& options) {
         text = describe_exr(result);
     } else if (extension == ".vdb") {
         result = inspect_vdb(path);
+        if (!options.slice.empty()) result["slice"] = write_slice(options);
         text = describe_json(result);
     } else {
         throw core::InputError(core::ErrorKind::kUsage,
@@ -126,12 +150,20 @@ void add_inspect_command(CLI::App& app, Program& program) {
     const auto options = std::make_shared<InspectOptions>();
     verb->add_option("FILE", options->file, "A scene, a distance field or a picture")->required();
     verb->add_option("--scene", options->scene, "Which scene of a glTF file: NAME or INDEX");
+    verb->add_option("--slice", options->slice, "Draw a plane of a .vdb into this PNG");
+    verb->add_option("--axis", options->axis, "Of --slice: the plane's normal, x, y or z")
+        ->check(CLI::IsMember({"x", "y", "z"}).description(""))
+        ->capture_default_str();
+    verb->add_option("--at", options->at, "Of --slice: where along the axis, from 0 to 1 through the field")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
     add_common_options(*verb, program.common);
     verb->footer(
         "Examples:\n"
         "  fieldlight inspect room.glb\n"
         "  fieldlight inspect room.glb --json\n"
-        "  fieldlight inspect picture.exr");
+        "  fieldlight inspect picture.exr\n"
+        "  fieldlight inspect scene.bake/wall_0.vdb --slice wall.png --axis x --at 0.25");
     verb->callback([&program, options] { run_verb(program, [&] { inspect(program, *options); }); });
 }
 

@@ -410,6 +410,60 @@ VdbGridSummary summarise(const openvdb::GridBase& grid) {
 
 }  // namespace
 
+namespace {
+
+VdbSlice cut(const fs::path& path, const openvdb::FloatGrid& grid, int axis, double at) {
+    constexpr int kMostVoxels = 4096;
+    const openvdb::Vec3d size = grid.voxelSize();
+    if (!grid.hasUniformVoxels() || !(size[0] > 0.0)) fail(path, "its voxels are not cubes");
+    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    if (box.empty()) fail(path, fmt::format("grid '{}' has no active voxel", grid.getName()));
+    const openvdb::Coord extent = box.dim();
+    for (int i = 0; i < 3; ++i) {
+        if (extent[i] < 1 || extent[i] > kMostVoxels) {
+            fail(path,
+                 fmt::format("spans {} voxels along a side; at most {} are drawn", extent[i], kMostVoxels));
+        }
+    }
+    // Columns and rows of the picture; rows run down.
+    const int column_axis = axis == 0 ? 2 : 0, row_axis = axis == 1 ? 2 : 1;
+    openvdb::Coord point;
+    point[axis] = box.min()[axis] + static_cast<int>(std::lround(at * (extent[axis] - 1)));
+
+    VdbSlice slice;
+    slice.grid = grid.getName();
+    slice.width = extent[column_axis];
+    slice.height = extent[row_axis];
+    slice.background_voxels = std::abs(static_cast<double>(grid.background())) / size[0];
+    slice.position = grid.indexToWorld(point)[axis];
+    slice.distance_voxels.reserve(static_cast<std::size_t>(slice.width) *
+                                  static_cast<std::size_t>(slice.height));
+    const auto values = grid.getConstAccessor();
+    for (int row = 0; row < slice.height; ++row) {
+        point[row_axis] = axis == 1 ? box.min()[row_axis] + row : box.max()[row_axis] - row;
+        for (int column = 0; column < slice.width; ++column) {
+            point[column_axis] = box.min()[column_axis] + column;
+            slice.distance_voxels.push_back(static_cast<float>(values.getValue(point) / size[0]));
+        }
+    }
+    return slice;
+}
+
+}  // namespace
+
+VdbSlice read_vdb_slice(const fs::path& path, int axis, double at) {
+    std::optional<VdbSlice> slice;
+    with_open_file(path, [&](openvdb::io::File& file) {
+        const auto grids = file.getGrids();
+        for (const auto& grid : *grids) {
+            const auto distances = openvdb::gridPtrCast<openvdb::FloatGrid>(grid);
+            if (distances && !slice) slice = cut(path, *distances, axis, at);
+        }
+    });
+    if (!slice) fail(path, "holds no grid of floats to draw");
+    return *std::move(slice);
+}
+
 std::vector<VdbGridSummary> summarise_vdb(const fs::path& path) {
     std::vector<VdbGridSummary> summaries;
     with_open_file(path, [&](openvdb::io::File& file) {

@@ -55,6 +55,23 @@ struct VdbGridSummary {
     std::map<std::string, std::string> metadata;
 };
 
+/// A plane through a grid of distances.
+struct VdbSlice {
+    std::string grid;           ///< Its name.
+    int width = 0, height = 0;  ///< Lattice points.
+    /// Row-major, as seen along the axis: for x y z columns run along z x x, rows along -y z -y, so that +Y
+    /// is up. Units are the grid's voxels; beyond the band +-background.
+    std::vector<float> distance_voxels;
+    double background_voxels = 0.0;
+    double position = 0.0;  ///< World coordinate of the plane.
+};
+
+/// Cuts the first float grid of a .vdb, whoever wrote it.
+/// @param axis 0, 1, 2: the plane's normal. @param at from 0 to 1 through the active voxels' box.
+/// @throws as read_field; also kBadData where no float grid with uniform voxels holds a finite active voxel,
+/// and where the box has more than 4,096 voxels along a side.
+VdbSlice read_vdb_slice(const std::filesystem::path& path, int axis, double at);
+
 /// Reads every grid of a .vdb, whoever wrote it. @throws as read_field
 std::vector<VdbGridSummary> summarise_vdb(const std::filesystem::path& path);
 
