@@ -112,10 +112,13 @@ TEST(TracerDifference, TellsMissesFromFalseHits) {
 
 TEST(TracerDifference, JudgesByTheVoxelOfWhatWasHitInstead) {
     // The tested tracer lacks the upper floor and sees the one below: a distance, in that one's voxels.
-    Scene scene = floor_at();
-    tests::add_instance(scene, tests::add_mesh(scene, tests::quad(10.0f, 10.0f)),
-                        tests::translation({0.0, 0.0, 0.5}));
-    const Scene lower = floor_at();
+    const auto with_upper_floor_at = [](const glm::dvec3& place) {
+        Scene scene = floor_at();
+        tests::add_instance(scene, tests::add_mesh(scene, tests::quad(10.0f, 10.0f)),
+                            tests::translation(place));
+        return scene;
+    };
+    const Scene scene = with_upper_floor_at({0.0, 0.0, 0.5}), lower = with_upper_floor_at({1000.0, 0.0, 0.5});
     const core::TriangleTracer expected(scene), found(lower);
     const std::vector<double> voxels = {kVoxel, 0.0};
     const TracerDifference difference =
