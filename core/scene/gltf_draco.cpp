@@ -85,8 +85,8 @@ private:
 };
 
 /// The counts that Draco's own decoder is about to believe. Google, "Draco Bitstream Specification", version
-/// 2.2: the sequential method begins with faces and points, edgebreaker with vertices, faces and the number of
-/// attribute sets that have seams.
+/// 2.2: the sequential method begins with faces and points, edgebreaker with vertices, faces and the number
+/// of attribute sets that have seams.
 struct Counts {
     std::uint32_t faces = 0;
     std::uint32_t vertices = 0;
