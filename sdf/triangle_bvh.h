@@ -56,8 +56,8 @@ public:
     /// @param mesh all triangles; @param selection those that the tree holds, as indices into `mesh`.
     TriangleBvh(std::span<const Triangle> mesh, std::span<const std::uint32_t> selection);
 
-    /// The closest triangle, or `seed` where nothing is nearer (at equal distance the lower index wins).
-    ClosestTriangle closest(const glm::dvec3& point, ClosestTriangle seed = {}) const;
+    /// The closest triangle, or `best` where nothing is nearer (at equal distance the lower index wins).
+    ClosestTriangle closest(const glm::dvec3& point, ClosestTriangle best = {}) const;
 
     /// The first triangle that the ray meets in [t_min, t_max]; at equal t the lower index wins.
     FirstHit first_hit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,

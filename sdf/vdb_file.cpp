@@ -109,7 +109,7 @@ void write_metadata(const FieldInfo& info, const std::vector<Feature>& features,
 
 openvdb::math::Transform::Ptr make_transform(const FieldInfo& info) {
     const double unit = file_unit(info.voxel_size);
-    const auto transform = openvdb::math::Transform::createLinearTransform(unit * info.voxel_size);
+    auto transform = openvdb::math::Transform::createLinearTransform(unit * info.voxel_size);
     transform->postTranslate({unit * info.origin.x, unit * info.origin.y, unit * info.origin.z});
     return transform;
 }
@@ -273,7 +273,7 @@ void check_transform(const fs::path& path, const openvdb::math::Transform& trans
 template <typename Grid>
 typename Grid::Ptr read_grid(const fs::path& path, openvdb::io::File& file, const char* name) {
     if (!file.hasGrid(name)) fail(path, fmt::format("has no grid '{}'; bake the mesh again", name));
-    const auto grid = openvdb::gridPtrCast<Grid>(file.readGrid(name));
+    auto grid = openvdb::gridPtrCast<Grid>(file.readGrid(name));
     if (!grid) fail(path, fmt::format("grid '{}' must be of type {}", name, Grid::gridType()));
     return grid;
 }
