@@ -77,6 +77,20 @@ struct Cubic {
     }
 };
 
+/// The cell that holds a position, or the nearest in [first, last]. Compared before it is converted: a ray
+/// through a far-away instance may be at 1e24 voxels, or nowhere at all (NaN: the first).
+glm::ivec3 cell_within(const glm::dvec3& position, const glm::ivec3& first, const glm::ivec3& last) {
+    glm::ivec3 cell = first;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (position[axis] >= last[axis]) {
+            cell[axis] = last[axis];
+        } else if (position[axis] > first[axis]) {
+            cell[axis] = static_cast<int>(position[axis]);
+        }
+    }
+    return cell;
+}
+
 }  // namespace
 
 RayMarch::RayMarch(const BrickGrid& grid, const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
@@ -98,8 +112,7 @@ RayMarch::RayMarch(const BrickGrid& grid, const glm::dvec3& origin, const glm::d
 void RayMarch::enter_cell(double t) {
     t_ = t;
     entry_axis_ = -1;
-    const glm::dvec3 position = origin_ + t * direction_;
-    cell_ = glm::clamp(glm::ivec3(glm::floor(position)), glm::ivec3(0), cell_limit_ - 1);
+    cell_ = cell_within(origin_ + t * direction_, glm::ivec3(0), cell_limit_ - 1);
     update_next_planes();
 }
 
@@ -153,8 +166,7 @@ bool RayMarch::skip_empty(const glm::ivec3& block, double bound_voxels) {
     if (!(exit_t < t_end_)) return false;
     if (exit_t > t_) t_ = exit_t;
     const glm::ivec3 first = block * kBrickCells;
-    const glm::ivec3 inside = glm::ivec3(glm::floor(origin_ + t_ * direction_));
-    cell_ = glm::clamp(inside, first, glm::min(first + kBrickCells, cell_limit_) - 1);
+    cell_ = cell_within(origin_ + t_ * direction_, first, glm::min(first + kBrickCells, cell_limit_) - 1);
     cell_[axis] = step_[axis] > 0 ? first[axis] + kBrickCells : first[axis] - 1;
     if (cell_[axis] < 0 || cell_[axis] >= cell_limit_[axis]) return false;
     entry_axis_ = axis;

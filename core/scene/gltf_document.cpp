@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "core/scene/gltf_extensions.h"
@@ -53,8 +54,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, bool allow_externa
     check_asset();
     for (const std::string& warning : check_extensions(root())) warn_once(warning);
     load_buffers();
-    std::uint64_t byte_count = file_size;
-    for (const Buffer& buffer : buffers_) byte_count += buffer.bytes.size();
+    const std::uint64_t byte_count = file_size + buffer_byte_count();
     memory_per_file_byte_ =
         lists_extension(root(), "KHR_draco_mesh_compression") ? kMemoryPerDracoFileByte : kMemoryPerFileByte;
     memory_limit_ = kMemoryAllowance + memory_per_file_byte_ * byte_count;
@@ -140,39 +140,61 @@ void GltfDocument::check_asset() const {
 }
 
 void GltfDocument::load_buffers() {
-    for (std::size_t i = 0; i < count("buffers"); ++i) {
-        Buffer& buffer = buffers_.emplace_back();
+    buffers_.resize(count("buffers"));
+    for (std::size_t i = 0; i < buffers_.size(); ++i) {
         try {
-            buffer.bytes = read_buffer(i);
+            read_buffer(i);
         } catch (const InputError& error) {
             // What the picture does not need may be broken, as images and meshes may be.
-            buffer.trouble = error;
+            buffers_[i].trouble = error;
             warn_once(fmt::format("a buffer is left out: {}", error.what()));
         }
     }
 }
 
-/// The bytes of a buffer; none for a placeholder.
-std::vector<std::uint8_t> GltfDocument::read_buffer(std::size_t index) {
+/// Fills in a buffer; a placeholder stays empty.
+void GltfDocument::read_buffer(std::size_t index) {
     const JsonElement buffer = element("buffers", index);
     const std::uint64_t byte_length = buffer.require("byteLength").unsigned_integer();
     if (byte_length == 0) buffer.fail("byteLength must be at least 1");
-    if (is_fallback(buffer)) return {};
-    std::vector<std::uint8_t> bytes;
+    if (is_fallback(buffer)) return;
+    std::shared_ptr<const std::vector<std::uint8_t>> data;
     if (const auto uri = buffer.find("uri")) {
-        bytes = read_uri(uri->text(), path_.parent_path(), allow_external_, buffer.where());
+        data = read_buffer_file(*uri, buffer.where());
     } else if (index == 0 && binary_chunk_) {
-        bytes = *std::exchange(binary_chunk_, std::nullopt);
+        data = std::make_shared<const std::vector<std::uint8_t>>(*std::exchange(binary_chunk_, std::nullopt));
     } else if (lists_extension(root(), kMeshopt)) {
-        return {};  // Fallbacks need not be marked.
+        return;  // Fallbacks need not be marked.
     } else {
         buffer.fail("has no uri, and only the first buffer of a GLB may be its binary chunk");
     }
-    if (byte_length > bytes.size()) {
+    if (byte_length > data->size()) {
         buffer.fail(
-            fmt::format("byteLength is {}, but the data ends after {} bytes", byte_length, bytes.size()));
+            fmt::format("byteLength is {}, but the data ends after {} bytes", byte_length, data->size()));
     }
-    bytes.resize(static_cast<std::size_t>(byte_length));
+    buffers_[index].bytes = std::span(*data).first(static_cast<std::size_t>(byte_length));
+    buffers_[index].data = std::move(data);
+}
+
+std::shared_ptr<const std::vector<std::uint8_t>> GltfDocument::read_buffer_file(const JsonElement& uri,
+                                                                                const std::string& what) {
+    const auto read = [&] {
+        return std::make_shared<const std::vector<std::uint8_t>>(
+            read_uri(uri.text(), path_.parent_path(), allow_external_, what));
+    };
+    const std::string path = relative_path_of_uri(uri.text());
+    if (path.empty()) return read();
+    const auto known = buffer_files_.find(path);
+    return known != buffer_files_.end() ? known->second : buffer_files_.emplace(path, read()).first->second;
+}
+
+/// Of all buffers together, what several share counted once.
+std::uint64_t GltfDocument::buffer_byte_count() const {
+    std::set<const void*> counted;
+    std::uint64_t bytes = 0;
+    for (const Buffer& buffer : buffers_) {
+        if (buffer.data && counted.insert(buffer.data.get()).second) bytes += buffer.data->size();
+    }
     return bytes;
 }
 
@@ -191,7 +213,7 @@ void GltfDocument::decode_compressed_views() {
 std::span<const std::uint8_t> GltfDocument::buffer_range(const JsonElement& object) const {
     const std::size_t index = object.require("buffer").index(buffers_.size(), "buffers");
     if (buffers_[index].trouble) throw InputError(*buffers_[index].trouble);
-    const std::vector<std::uint8_t>& buffer = buffers_[index].bytes;
+    const std::span<const std::uint8_t> buffer = buffers_[index].bytes;
     const std::uint64_t offset = object.unsigned_or("byteOffset", 0);
     const std::uint64_t length = object.require("byteLength").unsigned_integer();
     if (length == 0) object.fail("byteLength must be at least 1");
@@ -203,7 +225,7 @@ std::span<const std::uint8_t> GltfDocument::buffer_range(const JsonElement& obje
         object.fail(fmt::format("bytes {} to {} + {} lie outside a buffer of {} bytes", offset, offset,
                                 length, buffer.size()));
     }
-    return std::span<const std::uint8_t>(buffer).subspan(offset, length);
+    return buffer.subspan(offset, length);
 }
 
 GltfDocument::BufferView GltfDocument::buffer_view(std::size_t index) const {
@@ -215,6 +237,18 @@ GltfDocument::BufferView GltfDocument::buffer_view(std::size_t index) const {
     const auto decoded = decoded_views_.find(index);
     if (decoded != decoded_views_.end()) return {decoded->second, stride};
     return {buffer_range(view), stride};
+}
+
+std::string GltfDocument::image_source(std::size_t index) const {
+    const JsonElement image = element("images", index);
+    if (const auto uri = image.find("uri")) {
+        const std::string path = relative_path_of_uri(uri->text());
+        return path.empty() ? fmt::format("image {}", index) : fmt::format("file {}", path);
+    }
+    const auto view = image.find("bufferView");
+    if (!view) return fmt::format("image {}", index);
+    const BufferView bytes = buffer_view(view->index(count("bufferViews"), "bufferViews"));
+    return fmt::format("bytes {} {}", fmt::ptr(bytes.bytes.data()), bytes.bytes.size());
 }
 
 std::vector<std::uint8_t> GltfDocument::read_image(std::size_t index) const {

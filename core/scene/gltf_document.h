@@ -45,6 +45,9 @@ public:
     };
     BufferView buffer_view(std::size_t index) const;
 
+    /// What an image is read from. Images of equal sources are the same picture.
+    std::string image_source(std::size_t index) const;
+
     /// The still encoded bytes of an image, from its URI or buffer view.
     std::vector<std::uint8_t> read_image(std::size_t index) const;
 
@@ -61,7 +64,10 @@ private:
     std::string read_json_text(std::vector<std::uint8_t>& file);
     void check_asset() const;
     void load_buffers();
-    std::vector<std::uint8_t> read_buffer(std::size_t index);
+    void read_buffer(std::size_t index);
+    std::shared_ptr<const std::vector<std::uint8_t>> read_buffer_file(const JsonElement& uri,
+                                                                      const std::string& what);
+    std::uint64_t buffer_byte_count() const;
     void decode_compressed_views();
     std::span<const std::uint8_t> buffer_range(const JsonElement& object) const;
 
@@ -71,10 +77,13 @@ private:
     std::unique_ptr<nlohmann::json> json_;
     std::optional<std::vector<std::uint8_t>> binary_chunk_;
     struct Buffer {
-        std::vector<std::uint8_t> bytes;    ///< Empty: a placeholder without data.
-        std::optional<InputError> trouble;  ///< Why there are no bytes.
+        std::shared_ptr<const std::vector<std::uint8_t>> data;
+        std::span<const std::uint8_t> bytes;  ///< The part of `data` in use. Empty: a placeholder.
+        std::optional<InputError> trouble;    ///< Why there are no bytes.
     };
     std::vector<Buffer> buffers_;
+    /// The files that buffers name, by path: one that many of them name is read and held once.
+    std::map<std::string, std::shared_ptr<const std::vector<std::uint8_t>>> buffer_files_;
     std::map<std::size_t, std::vector<std::uint8_t>> decoded_views_;
     WarningList warnings_;
     std::uint64_t memory_per_file_byte_ = 0;

@@ -278,9 +278,12 @@ private:
     }
 
     std::uint32_t used_image(std::size_t gltf_image) {
+        const auto known = image_of_gltf_.find(gltf_image);
+        if (known != image_of_gltf_.end()) return known->second;
         const auto next = static_cast<std::uint32_t>(images_.size());
-        const auto [entry, is_new] = image_of_gltf_.try_emplace(gltf_image, next);
+        const auto [entry, is_new] = image_of_source_.try_emplace(document_.image_source(gltf_image), next);
         if (is_new) images_.push_back({gltf_image, std::nullopt});
+        image_of_gltf_.emplace(gltf_image, entry->second);
         return entry->second;
     }
 
@@ -369,6 +372,7 @@ private:
     GltfMaterials result_;
     std::map<std::size_t, int> texture_of_gltf_;
     std::map<std::size_t, std::uint32_t> image_of_gltf_;
+    std::map<std::string, std::uint32_t> image_of_source_;
     std::map<std::pair<int, float>, int> roughness_of_;  ///< By texture and glossiness.
     std::vector<ImageSource> images_;                    ///< What each of the result's images is made from.
 };

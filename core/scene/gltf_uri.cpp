@@ -172,6 +172,13 @@ std::optional<std::vector<std::uint8_t>> base64_decoded(std::string_view text) {
     return bytes;
 }
 
+std::string relative_path_of_uri(const std::string& uri) {
+    if (uri.starts_with(':') || !scheme_of(uri).empty()) return {};
+    const fs::path path(percent_decoded(uri));
+    if (std::find(path.begin(), path.end(), fs::path("..")) != path.end()) return {};
+    return path.lexically_normal().string();
+}
+
 std::vector<std::uint8_t> read_uri(const std::string& uri, const fs::path& folder, bool allow_external,
                                    const std::string& what) {
     const std::string scheme = scheme_of(uri);

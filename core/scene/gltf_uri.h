@@ -24,6 +24,10 @@ std::string percent_decoded(std::string_view text);
 /// The bytes of standard base64 (RFC 4648, section 4), or nothing if it is malformed. Padding may be missing.
 std::optional<std::vector<std::uint8_t>> base64_decoded(std::string_view text);
 
+/// The path that a relative URI names, decoded and lexically normal, so that two spellings of one file
+/// compare equal; empty for data and for whatever has a scheme or holds `..`.
+std::string relative_path_of_uri(const std::string& uri);
+
 /// The bytes behind a URI of a glTF file.
 /// @param folder the glTF file's own. @param what names the element in messages.
 /// @param allow_external lets paths be absolute, hold `..`, or lead out of the folder through links. Pipes,

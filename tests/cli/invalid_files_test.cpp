@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "core/image/png.h"
 #include "core/support/atomic_file.h"
 #include "core/support/parallel.h"
 #include "tests/support/program_run.h"
@@ -182,6 +183,46 @@ TEST(InvalidFiles, EndAsTheTableSaysWhereEverythingIsDrawn) {
         ++drawn;
     });
     EXPECT_GT(drawn, 100);
+}
+
+/// `count` copies of a JSON value, joined as the elements of an array.
+std::string repeated(const std::string& value, int count) {
+    std::string text = value;
+    for (int i = 1; i < count; ++i) text += "," + value;
+    return text;
+}
+
+// Neither is broken, but each would take gigabytes if every mention of a file were a copy of it.
+TEST(InvalidFiles, AFileThatManyBuffersNameIsReadOnce) {
+    const tests::TemporaryFolder temporary;
+    const fs::path file = temporary.path() / "greedy.gltf";
+    constexpr int kCount = 25'000;
+    core::write_text_atomically(
+        file, R"({"asset":{"version":"2.0"},"buffers":[)" +
+                  repeated(R"({"uri":"greedy.gltf","byteLength":9})", kCount / 2) + "," +
+                  repeated(R"({"uri":"./%67reedy.gltf","byteLength":800000})", kCount / 2) + "]}");
+    ASSERT_GT(fs::file_size(file), 800'000U);
+    const tests::ProgramRun run = tests::run_program({"inspect", file.string()});
+    expect_good_manners(run, file, 0);
+    EXPECT_EQ(run.err.find("left out"), std::string::npos) << run.err;
+}
+
+TEST(InvalidFiles, APictureThatManyImagesNameIsReadOnce) {
+    const tests::TemporaryFolder temporary;
+    const fs::path file = temporary.path() / "greedy.gltf";
+    constexpr int kSide = 2048, kCount = 4'000;
+    core::write_png(temporary.path() / "large.png", kSide, kSide,
+                    std::vector<std::uint8_t>(3 * kSide * kSide, 128));
+    std::string textures, materials;
+    for (int i = 0; i < kCount; ++i) {
+        const std::string comma = i == 0 ? "" : ",";
+        textures += comma + R"({"source":)" + std::to_string(i) + "}";
+        materials += comma + R"({"emissiveTexture":{"index":)" + std::to_string(i) + "}}";
+    }
+    core::write_text_atomically(file, R"({"asset":{"version":"2.0"},"images":[)" +
+                                          repeated(R"({"uri":"large.png"})", kCount) + R"(],"textures":[)" +
+                                          textures + R"(],"materials":[)" + materials + "]}");
+    expect_good_manners(tests::run_program({"inspect", file.string()}), file, 0);
 }
 
 }  // namespace

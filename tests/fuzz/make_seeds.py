@@ -12,7 +12,7 @@ import pathlib
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-TARGETS = ("gltf", "image", "vdb")
+TARGETS = ("gltf", "image", "mesh", "vdb")
 
 
 def main(names):

@@ -18,6 +18,7 @@
 // The targets, under names of their own (see CMakeLists.txt).
 extern "C" int fuzz_gltf(const std::uint8_t* data, std::size_t size);
 extern "C" int fuzz_image(const std::uint8_t* data, std::size_t size);
+extern "C" int fuzz_mesh(const std::uint8_t* data, std::size_t size);
 extern "C" int fuzz_vdb(const std::uint8_t* data, std::size_t size);
 
 namespace {
@@ -78,7 +79,7 @@ TEST_P(FuzzReplay, EveryInputEndsInAnAnswerWithinItsLimits) {
 
 INSTANTIATE_TEST_SUITE_P(Targets, FuzzReplay,
                          testing::Values(Subject{"gltf", fuzz_gltf}, Subject{"image", fuzz_image},
-                                         Subject{"vdb", fuzz_vdb}),
+                                         Subject{"mesh", fuzz_mesh}, Subject{"vdb", fuzz_vdb}),
                          [](const auto& subject) { return std::string(subject.param.name); });
 
 int take_too_much(const std::uint8_t*, std::size_t) {

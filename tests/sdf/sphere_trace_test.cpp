@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "sdf/instance_tree.h"
 #include "tests/sdf/baked_shapes.h"
@@ -170,6 +171,25 @@ TEST(RayMarch, EveryCrossingAlternatesAndTheLastIsOutwards) {
         most = std::max(most, count);
     }
     EXPECT_GE(most, 4);
+}
+
+TEST(RayMarch, PositionsThatNoIntegerHoldsEnd) {
+    // A ray that starts 1e24 voxels away, as at an instance of a tiny scale, has no position left when it
+    // comes to the grid. What it meets is open; that it ends, without a conversion that is undefined, is not.
+    const auto grid = grid_of(icosphere(2), 16);
+    const double nan = std::numeric_limits<double>::quiet_NaN(),
+                 inf = std::numeric_limits<double>::infinity();
+    for (const double far : {1e10, -1e10, 1e24, -1e24, 1e300, nan, inf, -inf}) {
+        for (const glm::dvec3& direction : {glm::dvec3(1, 0, 0), glm::dvec3(-1, 0.5, 1e-3)}) {
+            for (const double t_min : {0.0, 1.0, 1e24}) {
+                sdf::RayMarch march(*grid, glm::dvec3(far, 3.0, far), direction, t_min, 1e30);
+                sdf::Crossing crossing;
+                int count = 0;
+                while (count < 1000 && march.next(crossing)) ++count;
+                EXPECT_LT(count, 1000) << far;
+            }
+        }
+    }
 }
 
 }  // namespace

@@ -236,6 +236,100 @@ def scenes_and_leftovers():
     yield "scenes_and_leftovers", document.gltf()
 
 
+# The tetrahedron as the encoders of Debian's draco 1.5.5 and meshoptimizer 0.18 write it.
+DRACO = {
+    "edgebreaker": "RFJBQ08CAgEBAAAABAQAAwAAAS8BARAB/wAAAQAJAwAAAgEBAQADAwEQATADAFCCJJEEAAAAAP8AAAAAAAAAAAAAAAAAAAAAAIA/CA==",
+    "sequential": "RFJBQ08CAgEAAAAEBAEAAgEAAQMBAgMCAAMBAQAJAwAAAAAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAAAAAACAPw==",
+}
+MESHOPT = {
+    "positions": "oAAAATwAAAD//wE8AAAAfn0AAAEPAAAA//8BDwAAAH59AAABAwAAAP8BAwAAAH4AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA==",
+    "exponential": "oAABPAAAAEA/AAEgAAAAAAEPAAAAQD8AASAAAAAAAQMAAABAAAEgAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAADyAAAA8gAAAPI=",
+    "octahedral": "oAE/AAAA/v2pAQ8AAAD+WAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAfwA=",
+    "triangles": "4P4PEgPwBAIAdodWZ3iphmWJaJgBaQAA",
+    "indices": "0AAIAgIECAYEBAIGDAAAAAA=",
+}
+
+
+def draco():
+    for method, text in DRACO.items():
+        document = Document()
+        document.use("KHR_draco_mesh_compression", required=True)
+        view = document.view(base64.b64decode(text))
+        position = document.add("accessors", {"componentType": FLOAT, "count": 4, "type": "VEC3",
+                                              "min": [0, 0, 0], "max": [1, 1, 1]})
+        indices = document.add("accessors", {"componentType": UNSIGNED_INT, "count": 12, "type": "SCALAR"})
+        document.add("meshes", {"primitives": [{"attributes": {"POSITION": position}, "indices": indices, "extensions": {
+            "KHR_draco_mesh_compression": {"bufferView": view, "attributes": {"POSITION": 0}}}}]})
+        yield "draco_" + method, document.glb()
+
+
+def meshopt():
+    def packed_view(document, text, count, stride, mode, **more):
+        data = base64.b64decode(text)
+        document.binary += bytes(-len(document.binary) % 4)
+        extension = {"buffer": 0, "byteOffset": len(document.binary), "byteLength": len(data), "byteStride": stride,
+                     "count": count, "mode": mode, **more}
+        document.binary += data
+        view = {"buffer": 1, "byteLength": count * stride, "extensions": {"EXT_meshopt_compression": extension}}
+        if mode == "ATTRIBUTES":
+            view["byteStride"] = stride
+        return document.add("bufferViews", view)
+
+    cases = (("triangles", "positions", {}, "TRIANGLES"), ("indices", "positions", {}, "INDICES"),
+             ("triangles", "exponential", {"filter": "EXPONENTIAL"}, "TRIANGLES"))
+    for indices, positions, filters, mode in cases:
+        document = Document()
+        document.use("EXT_meshopt_compression", "KHR_mesh_quantization", required=True)
+        accessors = [
+            {"bufferView": packed_view(document, MESHOPT[positions], 4, 12, "ATTRIBUTES", **filters),
+             "componentType": FLOAT, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
+            {"bufferView": packed_view(document, MESHOPT["octahedral"], 4, 4, "ATTRIBUTES", filter="OCTAHEDRAL"),
+             "componentType": BYTE, "normalized": True, "count": 4, "type": "VEC3"},
+            {"bufferView": packed_view(document, MESHOPT[indices], 12, 4, mode), "componentType": UNSIGNED_INT,
+             "count": 12, "type": "SCALAR"}]
+        document.json["accessors"] = accessors
+        document.add("meshes", {"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "indices": 2}]})
+        document.json["buffers"] = [
+            {"byteLength": len(document.binary), "uri": "data:application/octet-stream;base64,"
+             + base64.b64encode(document.binary).decode()},
+            {"byteLength": 1000, "extensions": {"EXT_meshopt_compression": {"fallback": True}}}]
+        yield f"meshopt_{indices}_{positions}", document._text()
+
+
+def animated():
+    document = Document()
+    document.tetrahedron()
+    times = document.accessor([0, 0.5, 2], min=[0], max=[2])
+    turns = document.accessor([(0, 0, 0, 1), (0, 0.7071068, 0, 0.7071068), (0, 1, 0, 0)])
+    steps = document.accessor([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    # In tangent, value, out tangent.
+    curve = document.accessor([(0, 0, 0), (1, 1, 1), (1, 0, 0)] * 3)
+    document.add("animations", {"name": "all", "channels": [
+        {"sampler": 0, "target": {"node": 0, "path": "rotation"}},
+        {"sampler": 1, "target": {"node": 0, "path": "translation"}},
+        {"sampler": 2, "target": {"node": 0, "path": "scale"}}], "samplers": [
+            {"input": times, "output": turns, "interpolation": "LINEAR"},
+            {"input": times, "output": steps, "interpolation": "STEP"},
+            {"input": times, "output": curve, "interpolation": "CUBICSPLINE"}]})
+    yield "animated", document.glb()
+
+
+def shared_files():
+    """Many mentions of one file and of one picture."""
+    document = Document()
+    document.json["buffers"] = [{"byteLength": n, "uri": uri} for n, uri in
+                                enumerate(["input.gltf", "./input.gltf", "in%70ut.gltf"], start=1)]
+    document.json.update(meshes=[], accessors=[], bufferViews=[], nodes=[{}])
+    yield "one_file_thrice", document._text()
+    document = material_document(png(2, 2), "image/png")
+    image = dict(document.json["images"][0])
+    document.json["images"].append(image)
+    document.add("textures", {"source": len(document.json["images"]) - 1})
+    document.json["materials"].append({"emissiveFactor": [1, 1, 1],
+                                       "emissiveTexture": {"index": len(document.json["textures"]) - 1}})
+    yield "one_image_twice", document.glb()
+
+
 def files():
     """Containers: chunks, URIs of several kinds, files without geometry."""
     yield "empty", b'{"asset":{"version":"2.0"}}'
@@ -256,5 +350,5 @@ def files():
 def seeds():
     """Pairs of a name and a file's bytes."""
     for group in (index_kinds, modes, sparse, interleaved, quantized, morphed, materials, lights_and_cameras, instancing,
-                  scenes_and_leftovers, files):
+                  scenes_and_leftovers, draco, meshopt, animated, shared_files, files):
         yield from group()
