@@ -41,6 +41,31 @@ LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf) {
     return occupied;
 }
 
+/// Gives samples that the band does not hold the sign of their neighbours, in waves from those it holds.
+void fill_unknown(std::array<std::int16_t, kBrickSize>& sample, std::bitset<kBrickSize> is_known) {
+    constexpr std::int16_t kFarthest = 32767;
+    constexpr int kStride[] = {64, 8, 1};
+    while (!is_known.all() && is_known.any()) {
+        std::bitset<kBrickSize> reached = is_known;
+        for (int i = 0; i < kBrickSize; ++i) {
+            if (is_known[static_cast<std::size_t>(i)]) continue;
+            const int position[] = {i / 64, i / 8 % 8, i % 8};
+            for (int side = 0; side < 6; ++side) {
+                const int axis = side / 2, step = side % 2 == 0 ? -1 : 1;
+                const int there = position[axis] + step;
+                if (there < 0 || there >= kBrickSamples) continue;
+                const auto neighbor = static_cast<std::size_t>(i + step * kStride[axis]);
+                if (!is_known[neighbor]) continue;
+                sample[static_cast<std::size_t>(i)] =
+                    sample[neighbor] < 0 ? static_cast<std::int16_t>(-kFarthest) : kFarthest;
+                reached[static_cast<std::size_t>(i)] = true;
+                break;
+            }
+        }
+        is_known = reached;
+    }
+}
+
 /// Squared distance, in blocks, between two boxes of one block whose numbers differ by `offset` along an
 /// axis.
 std::int64_t gap_squared(int offset) {
@@ -49,6 +74,12 @@ std::int64_t gap_squared(int offset) {
 }
 
 }  // namespace
+
+std::int16_t stored_sample(float voxels) {
+    const float steps = std::clamp(std::round(voxels / kSampleStepVoxels), -32767.0f, 32767.0f);
+    const auto stored = static_cast<std::int16_t>(steps);
+    return voxels < 0.0f && stored == 0 ? std::int16_t{-1} : stored;
+}
 
 BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), features_(field.features) {
     const LeafMap map(field.leaves);
@@ -96,25 +127,46 @@ BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), features_(f
                 std::uint64_t{1} << (kBrickCells * local.y + local.z);
         }
     }
+    std::vector<std::vector<std::uint32_t>> palettes(blocks.size());
     core::parallel_for(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t number = begin; number < end; ++number) {
-            Brick& brick = bricks_[number];
-            const glm::ivec3 base = first + blocks[number] * kBrickCells;
-            for (int i = 0; i < kLeafSize; ++i) {
-                const glm::ivec3 sample = base + glm::ivec3(i / 64, i / 8 % 8, i % 8);
-                const FieldLeaf* leaf = map.find(sample);
-                const int slot = LeafMap::offset_in_leaf(sample);
-                const bool is_known = leaf && leaf->is_active(slot);
-                brick.distance[static_cast<std::size_t>(i)] =
-                    is_known ? static_cast<float>(leaf->distance[static_cast<std::size_t>(slot)] /
-                                                  info_.voxel_size)
-                             : kBandVoxels;
-                brick.triangle[static_cast<std::size_t>(i)] =
-                    is_known ? leaf->triangle[static_cast<std::size_t>(slot)] : -1;
-            }
+            fill_brick(map, first + blocks[number] * kBrickCells, bricks_[number], palettes[number]);
         }
     });
+    for (std::size_t number = 0; number < blocks.size(); ++number) {
+        bricks_[number].palette_first = static_cast<std::uint32_t>(palettes_.size());
+        palettes_.insert(palettes_.end(), palettes[number].begin(), palettes[number].end());
+    }
+    palettes_.shrink_to_fit();
     fill_empty_distances();
+}
+
+void BrickGrid::fill_brick(const LeafMap& map, const glm::ivec3& first_sample, Brick& brick,
+                           std::vector<std::uint32_t>& palette) const {
+    constexpr std::uint32_t kUnknown = kNoTriangle;
+    std::array<std::uint32_t, kBrickSize> triangles;
+    std::bitset<kBrickSize> is_known;
+    for (int i = 0; i < kBrickSize; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        const glm::ivec3 sample = first_sample + glm::ivec3(i / 64, i / 8 % 8, i % 8);
+        const FieldLeaf* leaf = map.find(sample);
+        const auto slot = static_cast<std::size_t>(LeafMap::offset_in_leaf(sample));
+        is_known[at] = leaf && leaf->is_active(static_cast<int>(slot));
+        triangles[at] = kUnknown;
+        if (!is_known[at]) continue;
+        brick.sample[at] = stored_sample(static_cast<float>(leaf->distance[slot] / info_.voxel_size));
+        if (leaf->triangle[slot] < 0) continue;
+        triangles[at] = static_cast<std::uint32_t>(leaf->triangle[slot]);
+        palette.push_back(triangles[at]);
+    }
+    std::sort(palette.begin(), palette.end());
+    palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        const auto entry = std::lower_bound(palette.begin(), palette.end(), triangles[i]);
+        brick.palette_entry[i] =
+            triangles[i] == kUnknown ? kNoPaletteEntry : static_cast<std::uint16_t>(entry - palette.begin());
+    }
+    fill_unknown(brick.sample, is_known);
 }
 
 void BrickGrid::fill_empty_distances() {
@@ -172,7 +224,7 @@ core::DoubleBounds BrickGrid::local_bounds() const {
 
 std::size_t BrickGrid::bytes() const {
     return sizeof(*this) + top_.capacity() * sizeof(top_[0]) + bricks_.capacity() * sizeof(Brick) +
-           features_.capacity();
+           palettes_.capacity() * sizeof(palettes_[0]) + features_.capacity();
 }
 
 }  // namespace sdf

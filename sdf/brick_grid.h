@@ -1,9 +1,9 @@
 // sdf/brick_grid.h: the field as the tracer walks it: bricks of samples, occupied cells, safe steps between.
 //
 // Space is cut into blocks of 7^3 cells. A block that holds a piece of the surface has a brick of 8^3
-// samples, a mask of the cells that hold a zero crossing, and each sample's closest triangle. Every other
-// block holds a lower bound of the distance to the nearest occupied cell, which is rigorous for the trilinear
-// surface whatever the interpolation error (raw samples are not).
+// samples of 16 bits, a mask of the cells that hold a zero crossing, and each sample's closest triangle.
+// Every other block holds a lower bound of the distance to the nearest occupied cell, which is rigorous for
+// the trilinear surface whatever the interpolation error (raw samples are not).
 #pragma once
 
 #include <array>
@@ -15,21 +15,39 @@
 
 #include "core/math/bounds.h"
 #include "sdf/sampled_field.h"
+#include "sdf/triangle_bvh.h"
 
 namespace sdf {
+
+class LeafMap;
 
 /// Cells, and samples, along one side of a brick.
 inline constexpr int kBrickCells = 7;
 inline constexpr int kBrickSamples = kBrickCells + 1;
 
-/// 8^3 samples in voxels, negative inside; x runs slowest, z fastest.
+inline constexpr int kBrickSize = kBrickSamples * kBrickSamples * kBrickSamples;
+
+/// Samples are stored in steps of this many voxels, +-32767 of them: as far as the band reaches.
+inline constexpr float kSampleStepVoxels = kBandVoxels / 32767.0f;
+
+/// The stored form of a distance in voxels: the nearest step, save that no value changes its sign. (0 counts
+/// as positive.)
+std::int16_t stored_sample(float voxels);
+
+/// 8^3 samples in steps of kSampleStepVoxels, negative inside; x runs slowest, z fastest. Where the band
+/// holds nothing the sample is the farthest one of its neighbours' sign, so that it makes no crossing.
 struct Brick {
-    std::array<float, kBrickSamples * kBrickSamples * kBrickSamples> distance;
-    std::array<std::int32_t, kBrickSamples * kBrickSamples * kBrickSamples> triangle;
+    std::array<std::int16_t, kBrickSize> sample;
+    std::array<std::uint16_t, kBrickSize> palette_entry;  ///< Of the closest triangle.
     /// One word an x-layer of cells, bit 7 y + z: the cell holds a zero crossing.
     std::array<std::uint64_t, kBrickCells> occupied;
+    std::uint32_t palette_first;  ///< Where the brick's palette begins among those of all bricks.
+    std::uint32_t unused;
 
     static constexpr int index(int x, int y, int z) { return (x * kBrickSamples + y) * kBrickSamples + z; }
+    float voxels(int i) const {
+        return static_cast<float>(sample[static_cast<std::size_t>(i)]) * kSampleStepVoxels;
+    }
     bool is_occupied(int x, int y, int z) const { return (occupied[x] >> (kBrickCells * y + z)) & 1; }
 };
 
@@ -67,9 +85,17 @@ public:
     }
     /// Entry of the top grid: a brick number if >= 0, else see empty_distance().
     std::int32_t entry(const glm::ivec3& block) const { return top_[block_index(block)]; }
+    /// All entries, z fastest.
+    const std::vector<std::int32_t>& top() const { return top_; }
     const Brick& brick_at(std::int32_t entry) const { return bricks_[static_cast<std::size_t>(entry)]; }
     /// Voxels from anywhere in an empty block to the nearest occupied cell, rounded down.
     static double empty_distance(std::int32_t entry) { return -(entry + 1) * kDistanceStep; }
+
+    /// The triangle closest to a sample of a brick; kNoTriangle where the band holds no sample.
+    std::uint32_t triangle(const Brick& brick, int i) const {
+        const std::uint16_t entry = brick.palette_entry[static_cast<std::size_t>(i)];
+        return entry == kNoPaletteEntry ? kNoTriangle : palettes_[brick.palette_first + entry];
+    }
 
     Feature feature(std::uint32_t triangle) const {
         return features_.empty() ? Feature::kSurface : features_[triangle];
@@ -83,10 +109,13 @@ public:
 
 private:
     static constexpr double kDistanceStep = 1.0 / 64.0;
+    static constexpr std::uint16_t kNoPaletteEntry = 0xffff;
 
     std::size_t block_index(const glm::ivec3& block) const {
         return (static_cast<std::size_t>(block.x) * block_count_.y + block.y) * block_count_.z + block.z;
     }
+    void fill_brick(const LeafMap& map, const glm::ivec3& first_sample, Brick& brick,
+                    std::vector<std::uint32_t>& palette) const;
     void fill_empty_distances();
 
     FieldInfo info_;
@@ -95,6 +124,7 @@ private:
     core::DoubleBounds traced_voxels_;
     std::vector<std::int32_t> top_;
     std::vector<Brick> bricks_;
+    std::vector<std::uint32_t> palettes_;  ///< The distinct triangles of each brick, ascending.
     std::vector<Feature> features_;
 };
 

@@ -6,12 +6,12 @@
 
 namespace sdf {
 
-CellTriangles::CellTriangles(const core::Mesh& mesh, const Brick& brick, const glm::ivec3& cell) {
+CellTriangles::CellTriangles(const core::Mesh& mesh, const BrickGrid& grid, const Brick& brick,
+                             const glm::ivec3& cell) {
     for (int i = 0; i < 8; ++i) {
-        const std::int32_t named = brick.triangle[static_cast<std::size_t>(
-            Brick::index(cell.x + (i >> 2), cell.y + (i >> 1 & 1), cell.z + (i & 1)))];
-        if (named < 0) continue;
-        const auto index = static_cast<std::uint32_t>(named);
+        const std::uint32_t index =
+            grid.triangle(brick, Brick::index(cell.x + (i >> 2), cell.y + (i >> 1 & 1), cell.z + (i & 1)));
+        if (index == kNoTriangle) continue;
         const auto end = indices_.begin() + count_;
         if (std::find(indices_.begin(), end, index) == end) {
             indices_[static_cast<std::size_t>(count_++)] = index;

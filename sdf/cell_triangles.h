@@ -25,7 +25,7 @@ struct TriangleHit {
 class CellTriangles {
 public:
     /// @param cell local coordinates within the brick
-    CellTriangles(const core::Mesh& mesh, const Brick& brick, const glm::ivec3& cell);
+    CellTriangles(const core::Mesh& mesh, const BrickGrid& grid, const Brick& brick, const glm::ivec3& cell);
 
     /// The triangle closest to a point; the lowest number of equally near ones.
     TriangleHit closest(const glm::dvec3& point) const;

@@ -22,7 +22,7 @@ std::optional<float> sample_at(const BrickGrid& grid, const glm::ivec3& sample) 
         }
         if (const Brick* brick = grid.brick(block)) {
             const glm::ivec3 local = sample - block * kBrickCells;
-            return brick->distance[static_cast<std::size_t>(Brick::index(local.x, local.y, local.z))];
+            return brick->voxels(Brick::index(local.x, local.y, local.z));
         }
     }
     return std::nullopt;
@@ -57,8 +57,7 @@ glm::dvec3 smooth_gradient(const BrickGrid& grid, const glm::ivec3& cell, const 
                                      position.x < kBrickSamples && position.y < kBrickSamples &&
                                      position.z < kBrickSamples;
                 const std::optional<float> sample =
-                    is_here ? brick->distance[static_cast<std::size_t>(
-                                  Brick::index(position.x, position.y, position.z))]
+                    is_here ? brick->voxels(Brick::index(position.x, position.y, position.z))
                             : sample_at(grid, cell + glm::ivec3(x - 1, y - 1, z - 1));
                 known[x][y][z] = sample.has_value();
                 value[x][y][z] = sample.value_or(0.0f);

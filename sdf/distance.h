@@ -16,8 +16,8 @@ struct CellCorners {
     static CellCorners load(const Brick& brick, const glm::ivec3& cell) {
         CellCorners corners;
         for (int i = 0; i < 8; ++i) {
-            corners.value[static_cast<std::size_t>(i)] = brick.distance[static_cast<std::size_t>(
-                Brick::index(cell.x + (i >> 2), cell.y + (i >> 1 & 1), cell.z + (i & 1)))];
+            corners.value[static_cast<std::size_t>(i)] =
+                brick.voxels(Brick::index(cell.x + (i >> 2), cell.y + (i >> 1 & 1), cell.z + (i & 1)));
         }
         return corners;
     }

@@ -40,4 +40,39 @@ void InstanceTree::build(std::span<const core::DoubleBounds> boxes, std::uint32_
     build(boxes, middle, end);
 }
 
+InstanceTree::Walk::Walk(const InstanceTree& tree, const glm::dvec3& origin, const glm::dvec3& direction,
+                         double t_min, double limit)
+    : tree_(&tree), origin_(origin), inverse_(finite_inverse(direction)), t_min_(t_min) {
+    double t = 0.0;
+    if (!tree.nodes_.empty() && entry_distance(0, limit, t)) push(0, t);
+}
+
+bool InstanceTree::Walk::entry_distance(std::uint32_t node, double limit, double& t) const {
+    t = t_min_;
+    return clip_to_box(tree_->nodes_[node].box, origin_, inverse_, t, limit);
+}
+
+bool InstanceTree::Walk::next(double limit, std::uint32_t& instance) {
+    while (leaf_next_ == leaf_end_) {
+        if (depth_ == 0) return false;
+        const Entry entry = stack_[--depth_];
+        if (entry.t > limit) continue;
+        const Node& node = tree_->nodes_[entry.node];
+        if (node.count > 0) {
+            leaf_next_ = node.first;
+            leaf_end_ = node.first + node.count;
+            break;
+        }
+        const std::uint32_t children[] = {entry.node + 1, node.first};
+        double t[2];
+        const bool met[] = {entry_distance(children[0], limit, t[0]),
+                            entry_distance(children[1], limit, t[1])};
+        const int near = met[0] && met[1] && t[1] < t[0] ? 1 : 0;
+        if (met[1 - near]) push(children[1 - near], t[1 - near]);
+        if (met[near]) push(children[near], t[near]);
+    }
+    instance = tree_->order_[leaf_next_++];
+    return true;
+}
+
 }  // namespace sdf

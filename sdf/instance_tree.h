@@ -14,15 +14,40 @@ namespace sdf {
 /// A binary tree, walked front to back with pruning at the nearest hit so far.
 class InstanceTree {
 public:
+    /// The median splits of 2^32 instances end at depth 32.
+    static constexpr int kMaxDepth = 34;
+
     /// One box an instance; empty boxes are never visited.
     InstanceTree() = default;
     explicit InstanceTree(std::span<const core::DoubleBounds> boxes);
 
-    /// Calls visit(instance) for instances whose box the ray meets within [t_min, limit()], near boxes first
-    /// as far as the tree can tell; `limit` is read anew before every step. visit returns true to stop.
-    template <typename Limit, typename Visit>
-    void walk(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, const Limit& limit,
-              const Visit& visit) const;
+    /// A walk along one ray: the instances whose box it meets, near boxes first as far as the tree can tell.
+    class Walk {
+    public:
+        Walk() = default;
+        /// @param limit beyond which nothing counts
+        Walk(const InstanceTree& tree, const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+             double limit);
+
+        /// The next instance whose box begins before `limit`, which may shrink from call to call; false once
+        /// there is none.
+        bool next(double limit, std::uint32_t& instance);
+
+    private:
+        struct Entry {
+            double t;
+            std::uint32_t node;
+        };
+        bool entry_distance(std::uint32_t node, double limit, double& t) const;
+        void push(std::uint32_t node, double t) { stack_[depth_++] = {t, node}; }
+
+        const InstanceTree* tree_ = nullptr;
+        glm::dvec3 origin_{0.0}, inverse_{0.0};
+        double t_min_ = 0.0;
+        std::uint32_t leaf_next_ = 0, leaf_end_ = 0;  ///< What is left of the last leaf.
+        int depth_ = 0;
+        Entry stack_[kMaxDepth];
+    };
 
     std::size_t bytes() const { return nodes_.size() * sizeof(Node) + order_.size() * sizeof(order_[0]); }
 
@@ -33,7 +58,6 @@ private:
         std::uint32_t count = 0;  ///< Leaf: number of entries. Inner: 0; the first child follows the node.
     };
     static constexpr std::uint32_t kLeafSize = 2;
-    static constexpr int kMaxDepth = 64;
 
     void build(std::span<const core::DoubleBounds> boxes, std::uint32_t begin, std::uint32_t end);
 
@@ -63,51 +87,6 @@ inline bool clip_to_box(const core::DoubleBounds& box, const glm::dvec3& origin,
         if (far < t_max) t_max = far;
     }
     return t_min <= t_max;
-}
-
-template <typename Limit, typename Visit>
-void InstanceTree::walk(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
-                        const Limit& limit, const Visit& visit) const {
-    if (nodes_.empty()) return;
-    const glm::dvec3 inverse = finite_inverse(direction);
-    struct Entry {
-        std::uint32_t node;
-        double t;
-    };
-    const auto entry_distance = [&](std::uint32_t node, double& t) {
-        double far = limit();
-        t = t_min;
-        return clip_to_box(nodes_[node].box, origin, inverse, t, far);
-    };
-    Entry stack[kMaxDepth];
-    int depth = 0;
-    double t = 0.0;
-    if (!entry_distance(0, t)) return;
-    stack[depth++] = {0, t};
-    while (depth > 0) {
-        const Entry entry = stack[--depth];
-        if (entry.t > limit()) continue;
-        const Node& node = nodes_[entry.node];
-        if (node.count > 0) {
-            for (std::uint32_t i = 0; i < node.count; ++i) {
-                if (visit(order_[node.first + i])) return;
-            }
-            continue;
-        }
-        double t_first = 0.0, t_second = 0.0;
-        const bool first = entry_distance(entry.node + 1, t_first);
-        const bool second = entry_distance(node.first, t_second);
-        const Entry near_entry{entry.node + 1, t_first}, far_entry{node.first, t_second};
-        if (first && second) {
-            const bool in_order = t_first <= t_second;
-            stack[depth++] = in_order ? far_entry : near_entry;
-            stack[depth++] = in_order ? near_entry : far_entry;
-        } else if (first) {
-            stack[depth++] = near_entry;
-        } else if (second) {
-            stack[depth++] = far_entry;
-        }
-    }
 }
 
 }  // namespace sdf

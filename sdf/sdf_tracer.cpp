@@ -35,6 +35,9 @@ constexpr double kShellVoxels = 0.25;
 /// lies farther is looked for where the ray leaves the shell.
 constexpr double kShellPassageVoxels = 8.0;
 
+/// Rays that are traced together: enough to keep the lanes of a kernel busy, few enough for the cache.
+constexpr std::size_t kBlockRays = 512;
+
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 glm::dvec3 triangle_normal(const core::Mesh& mesh, std::uint32_t index) {
@@ -97,16 +100,42 @@ struct SdfTracer::Nearest {
     bool found() const { return instance != core::kNoIndex; }
 };
 
+/// A ray's way through the box of one instance's field.
+struct SdfTracer::Passage {
+    std::uint32_t instance = core::kNoIndex;
+    glm::dvec3 origin{0.0};     ///< Voxel coordinates.
+    glm::dvec3 direction{0.0};  ///< Voxels a world unit.
+    double speed = 1.0;         ///< Its length.
+    double t_min = 0.0, t_max = 0.0;
+};
+
+/// A ray on its way through the scene.
+struct SdfTracer::Traced {
+    core::Ray ray;
+    std::size_t number = 0;  ///< In its stream.
+    InstanceTree::Walk walk;
+    Nearest nearest;
+    Passage passage;
+    std::uint32_t steps = 0;
+    bool is_exhausted = false;
+};
+
 struct SdfTracer::Work {
     std::uint64_t rays = 0;
     std::uint64_t steps = 0;
     std::uint64_t exhausted = 0;
-    std::uint32_t ray_steps = 0;
-    bool ray_exhausted = false;
+    std::vector<Traced> traced;
+    std::vector<MarchRay> rays_to_march;
+    std::vector<MarchHit> march_hits;
 };
 
-SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids)
-    : scene_(scene), grids_(std::move(grids)), has_alpha_(core::has_alpha(scene)) {
+SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids,
+                     HitMode hit_mode)
+    : scene_(scene),
+      grids_(std::move(grids)),
+      atlas_(grids_),
+      hit_mode_(hit_mode),
+      has_alpha_(core::has_alpha(scene)) {
     assert(grids_.size() == scene.meshes.size());
     triangles_.resize(grids_.size(), TriangleBvh({}, {}));
     core::parallel_for(grids_.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -125,6 +154,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         const double h = grid->voxel_size();
         PlacedGrid& placed = placed_[i];
         placed.grid = grid;
+        placed.place = atlas_.place(instance.mesh);
         placed.triangles = triangles_[instance.mesh].empty() ? nullptr : &triangles_[instance.mesh];
         placed.voxel_from_world_direction = glm::dmat3(instance.local_from_world) / h;
         placed.voxel_origin = (glm::dvec3(instance.local_from_world[3]) - grid->origin()) / h;
@@ -181,7 +211,7 @@ bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found)
         return true;
     }
     const glm::ivec3 cell = crossing.cell - crossing.cell / kBrickCells * kBrickCells;
-    const CellTriangles triangles(ray.mesh, grid.brick_at(crossing.brick), cell);
+    const CellTriangles triangles(ray.mesh, grid, grid.brick_at(crossing.brick), cell);
     const glm::dvec3 point = grid.origin() + h * (glm::dvec3(crossing.cell) + crossing.point);
     const TriangleHit hit = triangles.closest(point);
     if (!hit) return false;
@@ -210,41 +240,100 @@ bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found)
     return true;
 }
 
-void SdfTracer::trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest,
-                               Work& work) const {
-    const PlacedGrid& placed = placed_[instance];
-    LocalRay local{ray,
-                   instance,
-                   placed,
-                   scene_.meshes[scene_.instances[instance].mesh],
-                   placed.voxel_from_world_direction * glm::dvec3(ray.origin) + placed.voxel_origin,
-                   placed.voxel_from_world_direction * glm::dvec3(ray.direction),
-                   nearest.t,
-                   ray.t_min,
-                   false};
-    double t_min = ray.t_min, t_max = nearest.t;
-    if (!clip_to_box(placed.grid->traced_voxels(), local.origin, finite_inverse(local.direction), t_min,
-                     t_max)) {
+bool SdfTracer::enter_next_instance(Traced& traced) const {
+    Passage& passage = traced.passage;
+    while (traced.walk.next(traced.nearest.t, passage.instance)) {
+        const PlacedGrid& placed = placed_[passage.instance];
+        passage.origin =
+            placed.voxel_from_world_direction * glm::dvec3(traced.ray.origin) + placed.voxel_origin;
+        passage.direction = placed.voxel_from_world_direction * glm::dvec3(traced.ray.direction);
+        passage.t_min = traced.ray.t_min;
+        passage.t_max = traced.nearest.t;
+        if (clip_to_box(placed.grid->traced_voxels(), passage.origin, finite_inverse(passage.direction),
+                        passage.t_min, passage.t_max)) {
+            passage.speed = glm::length(passage.direction);
+            return true;
+        }
+    }
+    return false;
+}
+
+MarchRay SdfTracer::march_ray(const Passage& passage) const {
+    // A hit close to the end is the kernel's to find and finish_passage()'s to judge, in double.
+    constexpr double kBeyond = 1e-3;
+    constexpr double kParallel = 1e-20;
+    const FieldAtlas::Place& place = placed_[passage.instance].place;
+    // From here on single precision suffices: it is that of the field's own box.
+    const glm::dvec3 start = passage.origin + passage.t_min * passage.direction;
+    const double inverse_speed = 1.0 / passage.speed;
+    MarchRay ray;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double direction = passage.direction[axis] * inverse_speed;
+        ray.origin[axis] = glm::clamp(static_cast<float>(start[axis]), 0.0f, place.cell_count[axis]);
+        ray.direction[axis] = std::abs(direction) < kParallel ? 0.0f : static_cast<float>(direction);
+        ray.cell_count[axis] = place.cell_count[axis];
+    }
+    ray.length = static_cast<float>((passage.t_max - passage.t_min) * passage.speed + kBeyond);
+    ray.top_base = place.top_base;
+    ray.top_stride_x = place.stride_x;
+    ray.top_stride_y = place.stride_y;
+    return ray;
+}
+
+void SdfTracer::finish_passage(const MarchHit& march_hit, Traced& traced) const {
+    const Passage& passage = traced.passage;
+    const PlacedGrid& placed = placed_[passage.instance];
+    traced.steps += march_hit.steps;
+    const bool is_hit = march_hit.status == MarchStatus::kHit;
+    if (!is_hit && !placed.triangles) {
+        traced.is_exhausted = traced.is_exhausted || march_hit.status == MarchStatus::kExhausted;
         return;
     }
+    LocalRay local{traced.ray,
+                   passage.instance,
+                   placed,
+                   scene_.meshes[scene_.instances[passage.instance].mesh],
+                   passage.origin,
+                   passage.direction,
+                   traced.nearest.t,
+                   traced.ray.t_min,
+                   false};
     if (placed.triangles) {
         local.is_inside =
-            distance_at(*placed.grid, local.origin + t_min * local.direction).value_or(1.0) < 0.0;
+            distance_at(*placed.grid, passage.origin + passage.t_min * passage.direction).value_or(1.0) < 0.0;
     }
-    RayMarch march(*placed.grid, local.origin, local.direction, t_min, t_max);
-    Crossing crossing;
     Nearest found;
-    while (!found.found() && march.next(crossing)) resolve(local, crossing, found);
+    Crossing crossing;
+    if (is_hit) {
+        crossing.t = passage.t_min + march_hit.distance / passage.speed;
+        if (crossing.t <= passage.t_max) {
+            crossing.cell = {march_hit.cell[0], march_hit.cell[1], march_hit.cell[2]};
+            crossing.point = glm::clamp(
+                passage.origin + crossing.t * passage.direction - glm::dvec3(crossing.cell), 0.0, 1.0);
+            crossing.brick = march_hit.brick - placed.place.brick_base;
+            crossing.enters_negative = march_hit.enters_negative;
+            // What lies behind a crossing that is no visible surface is walked to one by one.
+            if (!resolve(local, crossing, found)) walk_crossings(local, passage, found, traced);
+        }
+    }
     // The ray ends within a shell.
     if (placed.triangles && !found.found() && local.is_inside) {
-        meet_triangle(local, local.unmet_since, t_max, found);
+        meet_triangle(local, local.unmet_since, passage.t_max, found);
     }
     // At equal distance the lowest instance wins, whatever the order of the walk.
-    if (found.found() && (found.t < nearest.t || !nearest.found() || instance < nearest.instance)) {
+    Nearest& nearest = traced.nearest;
+    if (found.found() && (found.t < nearest.t || !nearest.found() || passage.instance < nearest.instance)) {
         nearest = found;
     }
-    work.ray_steps += march.steps();
-    work.ray_exhausted = work.ray_exhausted || march.is_exhausted();
+}
+
+void SdfTracer::walk_crossings(LocalRay& local, const Passage& passage, Nearest& found,
+                               Traced& traced) const {
+    RayMarch march(*local.placed.grid, passage.origin, passage.direction, passage.t_min, passage.t_max);
+    Crossing crossing;
+    while (!found.found() && march.next(crossing)) resolve(local, crossing, found);
+    traced.steps += march.steps();
+    traced.is_exhausted = traced.is_exhausted || march.is_exhausted();
 }
 
 glm::dvec3 SdfTracer::triangle_side(const core::Ray& ray, const Nearest& nearest) const {
@@ -277,7 +366,9 @@ glm::dvec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) c
     return normal;
 }
 
-core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const {
+core::Hit SdfTracer::finish(const Traced& traced) const {
+    const core::Ray& ray = traced.ray;
+    const Nearest& nearest = traced.nearest;
     const PlacedGrid& placed = placed_[nearest.instance];
     const glm::dvec3 direction(ray.direction);
     const glm::dvec3 normal = nearest.is_triangle ? triangle_side(ray, nearest) : field_side(ray, nearest);
@@ -299,47 +390,74 @@ core::Hit SdfTracer::finish(const core::Ray& ray, const Nearest& nearest) const 
     return hit;
 }
 
-core::Hit SdfTracer::trace_one(const core::Ray& ray, bool any, Work& work) const {
-    ++work.rays;
-    core::Hit hit;
-    if (!core::is_valid_ray(ray)) return hit;
-    work.ray_steps = 0;
-    work.ray_exhausted = false;
-    Nearest nearest;
-    nearest.t = ray.t_max;
-    tree_.walk(
-        glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min, [&] { return nearest.t; },
-        [&](std::uint32_t instance) {
-            trace_instance(ray, instance, nearest, work);
-            return any && nearest.found();
-        });
-    work.steps += work.ray_steps;
-    work.exhausted += work.ray_exhausted;
-    if (nearest.found()) {
-        if (any) {
-            hit.status = core::HitStatus::kHit;
-        } else {
-            hit = finish(ray, nearest);
+template <typename Finished>
+void SdfTracer::trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any,
+                            Work& work, const Finished& finished) const {
+    std::vector<Traced>& traced = work.traced;
+    traced.clear();
+    const auto end_ray = [&](Traced& ray) {
+        work.steps += ray.steps;
+        work.exhausted += ray.is_exhausted;
+        finished(ray);
+    };
+    for (std::size_t i = begin; i < end; ++i) {
+        Traced& ray = traced.emplace_back();
+        ray.ray = rays.get(i);
+        ray.number = i;
+        ray.nearest.t = ray.ray.t_max;
+        if (core::is_valid_ray(ray.ray)) {
+            ray.walk = InstanceTree::Walk(tree_, glm::dvec3(ray.ray.origin), glm::dvec3(ray.ray.direction),
+                                          ray.ray.t_min, ray.nearest.t);
+            if (enter_next_instance(ray)) continue;
         }
-    } else if (work.ray_exhausted) {
-        hit.status = core::HitStatus::kExhausted;
+        end_ray(ray);
+        traced.pop_back();
     }
-    hit.steps = work.ray_steps;
-    return hit;
+    work.rays += end - begin;
+    while (!traced.empty()) {
+        work.rays_to_march.resize(traced.size());
+        work.march_hits.resize(traced.size());
+        for (std::size_t i = 0; i < traced.size(); ++i) work.rays_to_march[i] = march_ray(traced[i].passage);
+        march_rays(atlas_.table(), hit_mode_, work.rays_to_march, work.march_hits);
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < traced.size(); ++i) {
+            finish_passage(work.march_hits[i], traced[i]);
+            if ((any && traced[i].nearest.found()) || !enter_next_instance(traced[i])) {
+                end_ray(traced[i]);
+            } else {
+                if (kept != i) traced[kept] = traced[i];
+                ++kept;
+            }
+        }
+        traced.resize(kept);
+    }
 }
 
 void SdfTracer::trace_closest(const core::RayStream& rays, core::HitStream& hits) const {
     hits.resize(rays.size());
     Work work;
-    for (std::size_t i = 0; i < rays.size(); ++i) hits.set(i, trace_one(rays.get(i), false, work));
+    for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
+        trace_block(rays, begin, std::min(begin + kBlockRays, rays.size()), false, work,
+                    [&](const Traced& traced) {
+                        core::Hit hit;
+                        if (traced.nearest.found()) {
+                            hit = finish(traced);
+                        } else if (traced.is_exhausted) {
+                            hit.status = core::HitStatus::kExhausted;
+                        }
+                        hit.steps = traced.steps;
+                        hits.set(traced.number, hit);
+                    });
+    }
     count(work);
 }
 
 void SdfTracer::trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const {
     assert(occluded.size() == rays.size());
     Work work;
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-        occluded[i] = trace_one(rays.get(i), true, work).hit() ? 1 : 0;
+    for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
+        trace_block(rays, begin, std::min(begin + kBlockRays, rays.size()), true, work,
+                    [&](const Traced& traced) { occluded[traced.number] = traced.nearest.found() ? 1 : 0; });
     }
     count(work);
 }
@@ -360,7 +478,7 @@ SdfTracer::Statistics SdfTracer::statistics() const {
 }
 
 std::size_t SdfTracer::bytes() const {
-    std::size_t total = placed_.capacity() * sizeof(PlacedGrid) + tree_.bytes();
+    std::size_t total = placed_.capacity() * sizeof(PlacedGrid) + tree_.bytes() + atlas_.bytes();
     std::set<const BrickGrid*> counted;
     for (const auto& grid : grids_) {
         if (grid && counted.insert(grid.get()).second) total += grid->bytes();

@@ -15,6 +15,7 @@
 #include "core/trace/tracer.h"
 #include "sdf/brick_grid.h"
 #include "sdf/cell_triangles.h"
+#include "sdf/field_table.h"
 #include "sdf/instance_tree.h"
 #include "sdf/sphere_trace.h"
 #include "sdf/triangle_bvh.h"
@@ -38,7 +39,9 @@ public:
     /// @param scene must outlive the tracer.
     /// @param grids by mesh index; instances of a mesh without a grid are not there for rays.
     /// @pre grids.size() == scene.meshes.size()
-    SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids);
+    /// @throws core::InputError (kOutOfMemory) where the fields are too large for a FieldAtlas
+    SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids,
+              HitMode hit_mode = HitMode::kCubic);
 
     void trace_closest(const core::RayStream& rays, core::HitStream& hits) const override;
     void trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const override;
@@ -55,6 +58,7 @@ private:
     /// One instance, ready for rays.
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
+        FieldAtlas::Place place;
         const TriangleBvh* triangles = nullptr;  ///< Of the mesh, local units; null if nothing is thickened.
         glm::dmat3 voxel_from_world_direction{1.0};
         glm::dvec3 voxel_origin{0.0};         ///< Voxel coordinates of the world's origin.
@@ -63,12 +67,23 @@ private:
     };
     struct LocalRay;
     struct Nearest;
+    struct Passage;
+    struct Traced;
     struct Work;
 
-    /// The one path of both queries. Stops at any hit if `any`.
-    core::Hit trace_one(const core::Ray& ray, bool any, Work& work) const;
-    /// Looks for the first visible crossing of one instance before the nearest hit so far.
-    void trace_instance(const core::Ray& ray, std::uint32_t instance, Nearest& nearest, Work& work) const;
+    /// The one path of both queries: traces a few rays together and calls finished(ray number, Traced&) for
+    /// each. Stops at any hit if `any`.
+    template <typename Finished>
+    void trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any, Work& work,
+                     const Finished& finished) const;
+    /// Brings a ray to the next instance whose field it may meet; false once there is none.
+    bool enter_next_instance(Traced& traced) const;
+    /// The passage as the kernel takes it.
+    MarchRay march_ray(const Passage& passage) const;
+    /// Takes what the kernel found and looks for the first visible surface of the passage's instance.
+    void finish_passage(const MarchHit& march_hit, Traced& traced) const;
+    /// The same without a kernel, from crossing to crossing.
+    void walk_crossings(LocalRay& local, const Passage& passage, Nearest& found, Traced& traced) const;
     /// Finds the triangle of a crossing; false where there is no visible surface.
     bool resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const;
     /// Finds the first visible triangle that the ray truly meets in [t_min, t_max].
@@ -76,12 +91,14 @@ private:
     /// The normal that faces the ray: of the triangle itself, or of the field.
     glm::dvec3 triangle_side(const core::Ray& ray, const Nearest& nearest) const;
     glm::dvec3 field_side(const core::Ray& ray, const Nearest& nearest) const;
-    core::Hit finish(const core::Ray& ray, const Nearest& nearest) const;
+    core::Hit finish(const Traced& traced) const;
     void count(const Work& work) const;
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;
     std::vector<TriangleBvh> triangles_;  ///< By mesh; empty where nothing is thickened.
+    FieldAtlas atlas_;
+    HitMode hit_mode_;
     std::vector<PlacedGrid> placed_;
     InstanceTree tree_;
     bool has_alpha_ = false;

@@ -1,0 +1,73 @@
+// sdf/field_kernel.h: many rays through distance fields at once, in whatever vectors the processor has.
+//
+// The vectorised twin of RayMarch: it finds where a ray first crosses the surface of a field. Every lane is a
+// ray of its own, and a lane whose ray has ended takes the next one from the queue. No vector type and no
+// instruction set shows here; the widest that the processor has is chosen at run time.
+//
+// The sign of the field is carried along each ray from sample to sample, so that a crossing is seen as a
+// change of sign however the positions round: cells, bricks and blocks meet without gaps.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdf/brick_grid.h"
+
+namespace sdf {
+
+/// How a crossing is found: the dial between accuracy and time.
+enum class HitMode : std::uint8_t {
+    kEps,     ///< The first sample nearer than kHitEpsVoxels, moved by one secant.
+    kSecant,  ///< A change of sign over a cell, then false positions.
+    kCubic,   ///< The first root of the cell's cubic: the exact surface of the trilinear field.
+};
+
+/// Below this distance a sample counts as a hit in HitMode::kEps, in voxels.
+inline constexpr float kHitEpsVoxels = 0.1f;
+
+/// Fields of many meshes laid out for the kernel: blocks of 7^3 cells, those near the surface with a brick of
+/// 8^3 samples (see brick_grid.h for what an entry means).
+struct FieldTable {
+    const std::int32_t* top = nullptr;      ///< Entries of all fields; bricks count over all fields.
+    const std::int16_t* samples = nullptr;  ///< kBrickSize a brick, as in Brick, and one more in all.
+};
+
+/// A ray in the voxels of one field, and where that field lies in the table.
+struct MarchRay {
+    float origin[3];        ///< Within the field's box.
+    float direction[3];     ///< Unit length; components under 1e-20 are 0.
+    float length;           ///< Voxels to the ray's end, or to where it leaves the box.
+    std::int32_t top_base;  ///< First entry of the field.
+    std::int32_t top_stride_x, top_stride_y;
+    float cell_count[3];  ///< Cells along each side of the box.
+};
+
+enum class MarchStatus : std::uint8_t { kMiss, kHit, kExhausted };
+
+/// Where a ray crosses the surface.
+struct MarchHit {
+    float distance;        ///< Voxels from the origin.
+    std::int32_t brick;    ///< Over all fields.
+    std::int16_t cell[3];  ///< Within the field.
+    MarchStatus status;
+    bool enters_negative;  ///< From positive to negative values.
+    std::uint32_t steps;   ///< Cells and blocks visited.
+};
+
+/// Marches every ray to its first crossing. Each answer depends on its own ray alone, and is the same to the
+/// last bit on every instruction set.
+/// @pre hits.size() == rays.size()
+void march_rays(const FieldTable& fields, HitMode mode, std::span<const MarchRay> rays,
+                std::span<MarchHit> hits);
+
+/// Names of the instruction sets that this build has kernels for and this processor can run, best first.
+std::vector<std::string> kernel_targets();
+
+/// Runs kernels with the named instruction set from now on; empty: the best. For tests and measurements; not
+/// while others trace. @returns false if there is no such target
+bool select_kernel_target(const std::string& name);
+
+}  // namespace sdf
