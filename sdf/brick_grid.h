@@ -85,6 +85,7 @@ public:
     }
     /// Entry of the top grid: a brick number if >= 0, else see empty_distance().
     std::int32_t entry(const glm::ivec3& block) const { return top_[block_index(block)]; }
+    const std::vector<std::uint32_t>& palettes() const { return palettes_; }
     /// All entries, z fastest.
     const std::vector<std::int32_t>& top() const { return top_; }
     const Brick& brick_at(std::int32_t entry) const { return bricks_[static_cast<std::size_t>(entry)]; }

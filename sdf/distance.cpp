@@ -40,53 +40,45 @@ std::optional<double> distance_at(const BrickGrid& grid, const glm::dvec3& point
     return CellCorners::load(*brick, cell - block * kBrickCells).at(point - glm::dvec3(cell));
 }
 
-glm::dvec3 smooth_gradient(const BrickGrid& grid, const glm::ivec3& cell, const glm::dvec3& u) {
-    // The 4^3 samples round the cell, without the corners of that cube, which no difference needs.
-    double value[4][4][4];
-    bool known[4][4][4] = {};
-    const glm::ivec3 block = cell / kBrickCells;
-    const Brick* brick = grid.brick(block);
-    const glm::ivec3 local = cell - block * kBrickCells;
-    for (int x = 0; x < 4; ++x) {
-        for (int y = 0; y < 4; ++y) {
-            for (int z = 0; z < 4; ++z) {
-                const int outside = (x % 3 == 0) + (y % 3 == 0) + (z % 3 == 0);
-                if (outside > 1) continue;
-                const glm::ivec3 position = local + glm::ivec3(x - 1, y - 1, z - 1);
-                const bool is_here = brick && position.x >= 0 && position.y >= 0 && position.z >= 0 &&
-                                     position.x < kBrickSamples && position.y < kBrickSamples &&
-                                     position.z < kBrickSamples;
-                const std::optional<float> sample =
-                    is_here ? brick->voxels(Brick::index(position.x, position.y, position.z))
-                            : sample_at(grid, cell + glm::ivec3(x - 1, y - 1, z - 1));
-                known[x][y][z] = sample.has_value();
-                value[x][y][z] = sample.value_or(0.0f);
+glm::dvec3 lattice_gradient(const BrickGrid& grid, const glm::ivec3& block, int index) {
+    const Brick& brick = *grid.brick(block);
+    const glm::ivec3 local(index / 64, index / 8 % 8, index % 8);
+    constexpr int kStride[] = {64, 8, 1};
+    const double here = brick.voxels(index);
+    glm::dvec3 gradient(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        double value[2] = {here, here};
+        double width = 0.0;
+        for (int side = 0; side < 2; ++side) {
+            const int step = side == 0 ? -1 : 1;
+            const int there = local[axis] + step;
+            if (there >= 0 && there < kBrickSamples) {
+                value[side] = brick.voxels(index + step * kStride[axis]);
+                width += 1.0;
+                continue;
+            }
+            glm::ivec3 position = block * kBrickCells + local;
+            position[axis] += step;
+            if (const std::optional<float> sample = sample_at(grid, position)) {
+                value[side] = *sample;
+                width += 1.0;
             }
         }
+        if (width > 0.0) gradient[axis] = (value[1] - value[0]) / width;
     }
+    return gradient;
+}
+
+glm::dvec3 smooth_gradient(const BrickGrid& grid, const glm::ivec3& cell, const glm::dvec3& u) {
+    const glm::ivec3 block = cell / kBrickCells;
+    const glm::ivec3 local = cell - block * kBrickCells;
     glm::dvec3 gradient(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         const glm::ivec3 step(corner >> 2 & 1, corner >> 1 & 1, corner & 1);
         const double weight =
             (step.x ? u.x : 1.0 - u.x) * (step.y ? u.y : 1.0 - u.y) * (step.z ? u.z : 1.0 - u.z);
-        for (int axis = 0; axis < 3; ++axis) {
-            glm::ivec3 low = step + 1, high = step + 1;
-            low[axis] -= 1;
-            high[axis] += 1;
-            double width = 2.0;
-            if (!known[low.x][low.y][low.z]) {
-                low[axis] += 1;
-                width -= 1.0;
-            }
-            if (!known[high.x][high.y][high.z]) {
-                high[axis] -= 1;
-                width -= 1.0;
-            }
-            if (width > 0.0) {
-                gradient[axis] +=
-                    weight * (value[high.x][high.y][high.z] - value[low.x][low.y][low.z]) / width;
-            }
-        }
+        const glm::ivec3 sample = local + step;
+        gradient += weight * lattice_gradient(grid, block, Brick::index(sample.x, sample.y, sample.z));
     }
     return gradient;
 }

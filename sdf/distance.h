@@ -39,6 +39,11 @@ std::optional<float> sample_at(const BrickGrid& grid, const glm::ivec3& sample);
 /// The trilinear value at a point in voxel coordinates, or nothing in empty blocks and outside.
 std::optional<double> distance_at(const BrickGrid& grid, const glm::dvec3& point);
 
+/// Gradient of the field at sample `index` of a block's brick, in voxels: central differences, one-sided
+/// where a neighbour is not stored.
+/// @pre the block has a brick
+glm::dvec3 lattice_gradient(const BrickGrid& grid, const glm::ivec3& block, int index);
+
 /// Gradient of the field at a point: central differences of the samples at the cell's corners, interpolated
 /// trilinearly; one-sided where a neighbour is not stored. Far smoother than the gradient of the trilinear
 /// cell itself, which serves root finding alone.

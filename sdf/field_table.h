@@ -7,18 +7,21 @@
 #include <span>
 #include <vector>
 
+#include "core/scene/scene.h"
 #include "sdf/brick_grid.h"
 #include "sdf/field_kernel.h"
+#include "sdf/surface_kernel.h"
 
 namespace sdf {
 
-/// Top grids and samples of several grids, one after the other.
+/// Top grids, samples and triangles of several grids, one after the other.
 class FieldAtlas {
 public:
     /// Where one grid lies.
     struct Place {
         std::int32_t top_base = 0;
         std::int32_t brick_base = 0;
+        std::int32_t triangle_base = 0;
         std::int32_t stride_x = 0, stride_y = 0;
         glm::vec3 cell_count{0.0f};
     };
@@ -26,20 +29,36 @@ public:
     FieldAtlas() = default;
 
     /// Copies the grids in their order; null ones and those without a surface have an empty place.
+    /// @param meshes that the grids were made from, by the same index
     /// @throws core::InputError (kOutOfMemory) past kMostBricks
-    explicit FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids);
+    FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids, std::span<const core::Mesh> meshes);
 
     const Place& place(std::size_t grid) const { return places_[grid]; }
     FieldTable table() const { return {top_.data(), samples_.data()}; }
+    SurfaceTable surface_table() const {
+        return {gradients_.data(), palette_entries_.data(), palette_first_.data(), palettes_.data(),
+                triangles_.data()};
+    }
+    /// By its number over all fields.
+    const VoxelTriangle& triangle(std::int32_t number) const {
+        return triangles_[static_cast<std::size_t>(number)];
+    }
     std::size_t bytes() const;
 
     /// Kernels address samples by 32 bits: 2 GiB of them.
     static constexpr std::size_t kMostBricks = (std::size_t{1} << 21) - 1;
 
 private:
+    void copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place,
+                   std::size_t palette_base);
+
     std::vector<Place> places_;
     std::vector<std::int32_t> top_;
     std::vector<std::int16_t> samples_;
+    std::vector<std::int32_t> gradients_;
+    std::vector<std::uint16_t> palette_entries_;
+    std::vector<std::int32_t> palette_first_, palettes_;
+    std::vector<VoxelTriangle> triangles_;
 };
 
 }  // namespace sdf

@@ -40,11 +40,22 @@ void InstanceTree::build(std::span<const core::DoubleBounds> boxes, std::uint32_
     build(boxes, middle, end);
 }
 
-InstanceTree::Walk::Walk(const InstanceTree& tree, const glm::dvec3& origin, const glm::dvec3& direction,
-                         double t_min, double limit)
-    : tree_(&tree), origin_(origin), inverse_(finite_inverse(direction)), t_min_(t_min) {
+void InstanceTree::Walk::start(const InstanceTree& tree, const glm::dvec3& origin,
+                               const glm::dvec3& direction, double t_min, double limit) {
+    tree_ = &tree;
+    leaf_next_ = leaf_end_ = 0;
+    depth_ = 0;
+    if (tree.nodes_.empty()) return;
+    if (tree.nodes_.size() == 1) {
+        // The few instances there are clip the ray themselves.
+        leaf_end_ = tree.nodes_[0].count;
+        return;
+    }
+    origin_ = origin;
+    inverse_ = finite_inverse(direction);
+    t_min_ = t_min;
     double t = 0.0;
-    if (!tree.nodes_.empty() && entry_distance(0, limit, t)) push(0, t);
+    if (entry_distance(0, limit, t)) push(0, t);
 }
 
 bool InstanceTree::Walk::entry_distance(std::uint32_t node, double limit, double& t) const {

@@ -24,10 +24,9 @@ public:
     /// A walk along one ray: the instances whose box it meets, near boxes first as far as the tree can tell.
     class Walk {
     public:
-        Walk() = default;
         /// @param limit beyond which nothing counts
-        Walk(const InstanceTree& tree, const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
-             double limit);
+        void start(const InstanceTree& tree, const glm::dvec3& origin, const glm::dvec3& direction,
+                   double t_min, double limit);
 
         /// The next instance whose box begins before `limit`, which may shrink from call to call; false once
         /// there is none.

@@ -92,10 +92,11 @@ struct SdfTracer::Nearest {
     double t = 0.0;  ///< Until there is one: t_max.
     std::uint32_t instance = core::kNoIndex;
     std::uint32_t triangle = core::kNoIndex;
-    glm::dvec2 barycentrics{0.0};
+    glm::vec2 barycentrics{0.0f};
+    glm::vec3 gradient{0.0f};  ///< Of the field, in voxels, where not is_triangle.
+    bool enters_negative = true;
     bool is_front = true;
     bool is_triangle = false;  ///< The ray meets the triangle itself, not the field that stands for it.
-    Crossing crossing;         ///< Where not is_triangle.
 
     bool found() const { return instance != core::kNoIndex; }
 };
@@ -112,28 +113,30 @@ struct SdfTracer::Passage {
 /// A ray on its way through the scene.
 struct SdfTracer::Traced {
     core::Ray ray;
-    std::size_t number = 0;  ///< In its stream.
-    InstanceTree::Walk walk;
-    Nearest nearest;
-    Passage passage;
     std::uint32_t steps = 0;
     bool is_exhausted = false;
+    Nearest nearest;
+    Passage passage;
 };
 
+/// What is counted over the rays of a call, and the memory of its blocks.
 struct SdfTracer::Work {
-    std::uint64_t rays = 0;
     std::uint64_t steps = 0;
     std::uint64_t exhausted = 0;
-    std::vector<Traced> traced;
-    std::vector<MarchRay> rays_to_march;
+    std::vector<Traced> traced{kBlockRays};
+    std::vector<InstanceTree::Walk> walks{kBlockRays};  ///< Of the same rays.
+    std::vector<std::uint32_t> active;                  ///< Rays that are within a field's box.
+    std::vector<MarchRay> march_rays;                   ///< Of the active rays.
     std::vector<MarchHit> march_hits;
+    std::vector<std::uint32_t> met;  ///< Entries of `active` whose crossing is looked up in `surface`.
+    SurfacePoints surface;
 };
 
 SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids,
                      HitMode hit_mode)
     : scene_(scene),
       grids_(std::move(grids)),
-      atlas_(grids_),
+      atlas_(grids_, scene.meshes),
       hit_mode_(hit_mode),
       has_alpha_(core::has_alpha(scene)) {
     assert(grids_.size() == scene.meshes.size());
@@ -156,7 +159,10 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         placed.grid = grid;
         placed.place = atlas_.place(instance.mesh);
         placed.triangles = triangles_[instance.mesh].empty() ? nullptr : &triangles_[instance.mesh];
+        placed.is_opaque_solid = grid->info().clean_level_set && !has_alpha_;
         placed.voxel_from_world_direction = glm::dmat3(instance.local_from_world) / h;
+        placed.world_from_voxel_gradient =
+            glm::mat3(glm::transpose(placed.voxel_from_world_direction) * grid->voxel_size());
         placed.voxel_origin = (glm::dvec3(instance.local_from_world[3]) - grid->origin()) / h;
         placed.world_from_voxel_scale = largest_singular_value(glm::dmat3(instance.world_from_local)) * h;
         boxes[i] = core::transformed(grid->local_bounds(), instance.world_from_local);
@@ -185,9 +191,9 @@ bool SdfTracer::meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest
         const Triangle triangle{glm::dvec3(ray.mesh.positions[corner.x]),
                                 glm::dvec3(ray.mesh.positions[corner.y]),
                                 glm::dvec3(ray.mesh.positions[corner.z])};
-        found.barycentrics = closest_point(triangle, origin + met.t * direction).barycentrics;
-        if (!has_alpha_ || core::is_visible(scene_, ray.instance, met.triangle, glm::vec2(found.barycentrics),
-                                            ray.world.seed)) {
+        found.barycentrics = glm::vec2(closest_point(triangle, origin + met.t * direction).barycentrics);
+        if (!has_alpha_ ||
+            core::is_visible(scene_, ray.instance, met.triangle, found.barycentrics, ray.world.seed)) {
             found.t = met.t;
             found.instance = ray.instance;
             found.triangle = met.triangle;
@@ -233,16 +239,18 @@ bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found)
     found.t = crossing.t;
     found.instance = ray.instance;
     found.triangle = hit.index;
-    found.barycentrics = hit.point.barycentrics;
+    found.barycentrics = glm::vec2(hit.point.barycentrics);
     // Directions in voxels and in local units differ by h alone, which no sign depends on.
     found.is_front = glm::dot(ray.direction, hit.corners.scaled_normal()) < 0.0;
-    found.crossing = crossing;
+    found.gradient = glm::vec3(smooth_gradient(grid, crossing.cell, crossing.point));
+    found.enters_negative = crossing.enters_negative;
+    found.is_triangle = false;
     return true;
 }
 
-bool SdfTracer::enter_next_instance(Traced& traced) const {
+bool SdfTracer::enter_next_instance(Traced& traced, InstanceTree::Walk& walk) const {
     Passage& passage = traced.passage;
-    while (traced.walk.next(traced.nearest.t, passage.instance)) {
+    while (walk.next(traced.nearest.t, passage.instance)) {
         const PlacedGrid& placed = placed_[passage.instance];
         passage.origin =
             placed.voxel_from_world_direction * glm::dvec3(traced.ray.origin) + placed.voxel_origin;
@@ -280,31 +288,36 @@ MarchRay SdfTracer::march_ray(const Passage& passage) const {
     return ray;
 }
 
-void SdfTracer::finish_passage(const MarchHit& march_hit, Traced& traced) const {
+SdfTracer::LocalRay SdfTracer::local_ray(const Traced& traced) const {
+    const Passage& passage = traced.passage;
+    return {traced.ray,
+            passage.instance,
+            placed_[passage.instance],
+            scene_.meshes[scene_.instances[passage.instance].mesh],
+            passage.origin,
+            passage.direction,
+            traced.nearest.t,
+            traced.ray.t_min,
+            false};
+}
+
+void SdfTracer::keep_nearer(const Nearest& found, Traced& traced) const {
+    // At equal distance the lowest instance wins, whatever the order of the walk.
+    Nearest& nearest = traced.nearest;
+    if (found.found() && (found.t < nearest.t || !nearest.found() || found.instance < nearest.instance)) {
+        nearest = found;
+    }
+}
+
+void SdfTracer::finish_thickened(const MarchHit& march_hit, Traced& traced) const {
     const Passage& passage = traced.passage;
     const PlacedGrid& placed = placed_[passage.instance];
-    traced.steps += march_hit.steps;
-    const bool is_hit = march_hit.status == MarchStatus::kHit;
-    if (!is_hit && !placed.triangles) {
-        traced.is_exhausted = traced.is_exhausted || march_hit.status == MarchStatus::kExhausted;
-        return;
-    }
-    LocalRay local{traced.ray,
-                   passage.instance,
-                   placed,
-                   scene_.meshes[scene_.instances[passage.instance].mesh],
-                   passage.origin,
-                   passage.direction,
-                   traced.nearest.t,
-                   traced.ray.t_min,
-                   false};
-    if (placed.triangles) {
-        local.is_inside =
-            distance_at(*placed.grid, passage.origin + passage.t_min * passage.direction).value_or(1.0) < 0.0;
-    }
+    LocalRay local = local_ray(traced);
+    local.is_inside =
+        distance_at(*placed.grid, passage.origin + passage.t_min * passage.direction).value_or(1.0) < 0.0;
     Nearest found;
-    Crossing crossing;
-    if (is_hit) {
+    if (march_hit.status == MarchStatus::kHit) {
+        Crossing crossing;
         crossing.t = passage.t_min + march_hit.distance / passage.speed;
         if (crossing.t <= passage.t_max) {
             crossing.cell = {march_hit.cell[0], march_hit.cell[1], march_hit.cell[2]};
@@ -313,22 +326,58 @@ void SdfTracer::finish_passage(const MarchHit& march_hit, Traced& traced) const 
             crossing.brick = march_hit.brick - placed.place.brick_base;
             crossing.enters_negative = march_hit.enters_negative;
             // What lies behind a crossing that is no visible surface is walked to one by one.
-            if (!resolve(local, crossing, found)) walk_crossings(local, passage, found, traced);
+            if (!resolve(local, crossing, found)) walk_crossings(local, traced, found);
         }
     }
     // The ray ends within a shell.
-    if (placed.triangles && !found.found() && local.is_inside) {
-        meet_triangle(local, local.unmet_since, passage.t_max, found);
-    }
-    // At equal distance the lowest instance wins, whatever the order of the walk.
-    Nearest& nearest = traced.nearest;
-    if (found.found() && (found.t < nearest.t || !nearest.found() || passage.instance < nearest.instance)) {
-        nearest = found;
-    }
+    if (!found.found() && local.is_inside) meet_triangle(local, local.unmet_since, passage.t_max, found);
+    keep_nearer(found, traced);
 }
 
-void SdfTracer::walk_crossings(LocalRay& local, const Passage& passage, Nearest& found,
-                               Traced& traced) const {
+void SdfTracer::add_surface_point(const MarchHit& march_hit, const Passage& passage, std::size_t to,
+                                  SurfacePoints& surface) const {
+    const double t = passage.t_min + march_hit.distance / passage.speed;
+    const glm::dvec3 point = passage.origin + t * passage.direction;
+    surface.x[to] = static_cast<float>(point.x);
+    surface.y[to] = static_cast<float>(point.y);
+    surface.z[to] = static_cast<float>(point.z);
+    const int x = march_hit.cell[0], y = march_hit.cell[1], z = march_hit.cell[2];
+    surface.cell_x[to] = static_cast<float>(x);
+    surface.cell_y[to] = static_cast<float>(y);
+    surface.cell_z[to] = static_cast<float>(z);
+    surface.brick[to] = march_hit.brick;
+    surface.first_sample[to] = Brick::index(x % kBrickCells, y % kBrickCells, z % kBrickCells);
+}
+
+void SdfTracer::finish_plain(const MarchHit& march_hit, const SurfacePoints& surface, std::size_t at,
+                             Traced& traced) const {
+    const Passage& passage = traced.passage;
+    const PlacedGrid& placed = placed_[passage.instance];
+    Nearest found;
+    found.t = passage.t_min + march_hit.distance / passage.speed;
+    const std::int32_t number = surface.triangle[at] - placed.place.triangle_base;
+    const bool is_surface = surface.triangle[at] >= 0 &&
+                            surface.distance_squared[at] <= kFarthestTriangleVoxels * kFarthestTriangleVoxels;
+    found.triangle = static_cast<std::uint32_t>(number);
+    found.barycentrics = {surface.u[at], surface.v[at]};
+    if (is_surface && (!has_alpha_ || core::is_visible(scene_, passage.instance, found.triangle,
+                                                       found.barycentrics, traced.ray.seed))) {
+        found.instance = passage.instance;
+        found.gradient = {surface.gradient_x[at], surface.gradient_y[at], surface.gradient_z[at]};
+        found.enters_negative = march_hit.enters_negative;
+        const VoxelTriangle& triangle = atlas_.triangle(surface.triangle[at]);
+        const glm::vec3 scaled_normal = glm::cross(glm::vec3(triangle.ab[0], triangle.ab[1], triangle.ab[2]),
+                                                   glm::vec3(triangle.ac[0], triangle.ac[1], triangle.ac[2]));
+        found.is_front = glm::dot(glm::vec3(passage.direction), scaled_normal) < 0.0f;
+    } else {
+        LocalRay local = local_ray(traced);
+        walk_crossings(local, traced, found = Nearest());
+    }
+    keep_nearer(found, traced);
+}
+
+void SdfTracer::walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const {
+    const Passage& passage = traced.passage;
     RayMarch march(*local.placed.grid, passage.origin, passage.direction, passage.t_min, passage.t_max);
     Crossing crossing;
     while (!found.found() && march.next(crossing)) resolve(local, crossing, found);
@@ -336,140 +385,157 @@ void SdfTracer::walk_crossings(LocalRay& local, const Passage& passage, Nearest&
     traced.is_exhausted = traced.is_exhausted || march.is_exhausted();
 }
 
-glm::dvec3 SdfTracer::triangle_side(const core::Ray& ray, const Nearest& nearest) const {
+glm::vec3 SdfTracer::triangle_side(const core::Ray& ray, const Nearest& nearest) const {
     const core::Instance& instance = scene_.instances[nearest.instance];
     const glm::dvec3 normal = glm::normalize(glm::transpose(glm::dmat3(instance.local_from_world)) *
                                              triangle_normal(scene_.meshes[instance.mesh], nearest.triangle));
-    return glm::dot(normal, glm::dvec3(ray.direction)) > 0.0 ? -normal : normal;
+    return glm::vec3(glm::dot(normal, glm::dvec3(ray.direction)) > 0.0 ? -normal : normal);
 }
 
-glm::dvec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) const {
+glm::vec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) const {
     const PlacedGrid& placed = placed_[nearest.instance];
-    glm::dvec3 gradient = smooth_gradient(*placed.grid, nearest.crossing.cell, nearest.crossing.point);
-    if (!(glm::length(gradient) >= 1e-6)) {
+    glm::vec3 gradient = nearest.gradient;
+    if (!(glm::dot(gradient, gradient) >= 1e-12f)) {
         const core::Mesh& mesh = scene_.meshes[scene_.instances[nearest.instance].mesh];
-        gradient = triangle_normal(mesh, nearest.triangle);
-        if ((glm::dot(gradient, placed.voxel_from_world_direction * glm::dvec3(ray.direction)) < 0.0) !=
-            nearest.crossing.enters_negative) {
-            gradient = -gradient;
-        }
+        const glm::dvec3 normal = triangle_normal(mesh, nearest.triangle);
+        const bool enters =
+            glm::dot(normal, placed.voxel_from_world_direction * glm::dvec3(ray.direction)) < 0.0;
+        gradient = glm::vec3(enters == nearest.enters_negative ? normal : -normal);
     }
-    const glm::dvec3 direction(ray.direction);
     // Inverse transpose: gradients map by the transpose of voxel_from_world.
-    glm::dvec3 normal = glm::normalize(glm::transpose(placed.voxel_from_world_direction) * gradient);
-    if (!nearest.crossing.enters_negative) normal = -normal;
-    const double cosine = glm::dot(normal, direction);
+    glm::vec3 normal = glm::normalize(placed.world_from_voxel_gradient * gradient);
+    if (!nearest.enters_negative) normal = -normal;
+    const float cosine = glm::dot(normal, ray.direction);
     // The smooth normal may turn away from a ray that only just meets the surface. Its side stays what the
     // crossing says; it is tilted until it faces the ray.
-    constexpr double kFacing = 1e-6;
-    if (cosine > -kFacing) normal = glm::normalize(normal - (cosine + 2.0 * kFacing) * direction);
+    constexpr float kFacing = 1e-6f;
+    if (cosine > -kFacing) normal = glm::normalize(normal - (cosine + 2.0f * kFacing) * ray.direction);
     return normal;
 }
 
 core::Hit SdfTracer::finish(const Traced& traced) const {
+    core::Hit hit;
+    hit.steps = traced.steps;
     const core::Ray& ray = traced.ray;
     const Nearest& nearest = traced.nearest;
-    const PlacedGrid& placed = placed_[nearest.instance];
-    const glm::dvec3 direction(ray.direction);
-    const glm::dvec3 normal = nearest.is_triangle ? triangle_side(ray, nearest) : field_side(ray, nearest);
-
-    core::Hit hit;
+    if (!nearest.found()) {
+        if (traced.is_exhausted) hit.status = core::HitStatus::kExhausted;
+        return hit;
+    }
     hit.status = core::HitStatus::kHit;
     hit.t = std::clamp(static_cast<float>(nearest.t), ray.t_min, ray.t_max);
-    hit.normal = glm::vec3(normal);
+    hit.normal = nearest.is_triangle ? triangle_side(ray, nearest) : field_side(ray, nearest);
     hit.instance = nearest.instance;
     hit.triangle = nearest.triangle;
-    hit.barycentrics = glm::vec2(nearest.barycentrics);
+    hit.barycentrics = nearest.barycentrics;
     hit.front = nearest.is_front;
-    const glm::dvec3 origin(ray.origin);
-    const glm::dvec3 position = origin + nearest.t * direction;
-    const double magnitude = std::max({glm::length(position), glm::length(origin), nearest.t});
+    const glm::vec3 position = ray.origin + hit.t * ray.direction;
+    const float magnitude = std::max({glm::length(position), glm::length(ray.origin), hit.t});
     const double clearance_voxels = nearest.is_triangle ? 0.0 : kSurfaceClearanceVoxels;
-    hit.offset =
-        static_cast<float>(std::max(clearance_voxels * placed.world_from_voxel_scale, four_ulp(magnitude)));
+    hit.offset = static_cast<float>(
+        std::max(clearance_voxels * placed_[nearest.instance].world_from_voxel_scale, four_ulp(magnitude)));
     return hit;
 }
 
-template <typename Finished>
-void SdfTracer::trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any,
-                            Work& work, const Finished& finished) const {
-    std::vector<Traced>& traced = work.traced;
-    traced.clear();
-    const auto end_ray = [&](Traced& ray) {
-        work.steps += ray.steps;
-        work.exhausted += ray.is_exhausted;
-        finished(ray);
-    };
-    for (std::size_t i = begin; i < end; ++i) {
-        Traced& ray = traced.emplace_back();
-        ray.ray = rays.get(i);
-        ray.number = i;
-        ray.nearest.t = ray.ray.t_max;
-        if (core::is_valid_ray(ray.ray)) {
-            ray.walk = InstanceTree::Walk(tree_, glm::dvec3(ray.ray.origin), glm::dvec3(ray.ray.direction),
-                                          ray.ray.t_min, ray.nearest.t);
-            if (enter_next_instance(ray)) continue;
-        }
-        end_ray(ray);
-        traced.pop_back();
+void SdfTracer::march_active(bool any, Work& work) const {
+    const std::size_t count = work.active.size();
+    work.march_rays.resize(count);
+    work.march_hits.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        work.march_rays[i] = march_ray(work.traced[work.active[i]].passage);
     }
-    work.rays += end - begin;
-    while (!traced.empty()) {
-        work.rays_to_march.resize(traced.size());
-        work.march_hits.resize(traced.size());
-        for (std::size_t i = 0; i < traced.size(); ++i) work.rays_to_march[i] = march_ray(traced[i].passage);
-        march_rays(atlas_.table(), hit_mode_, work.rays_to_march, work.march_hits);
-        std::size_t kept = 0;
-        for (std::size_t i = 0; i < traced.size(); ++i) {
-            finish_passage(work.march_hits[i], traced[i]);
-            if ((any && traced[i].nearest.found()) || !enter_next_instance(traced[i])) {
-                end_ray(traced[i]);
+    march_rays(atlas_.table(), hit_mode_, work.march_rays, work.march_hits);
+
+    work.met.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+        Traced& traced = work.traced[work.active[i]];
+        const MarchHit& march_hit = work.march_hits[i];
+        const Passage& passage = traced.passage;
+        const PlacedGrid& placed = placed_[passage.instance];
+        traced.steps += march_hit.steps;
+        if (placed.triangles) {
+            finish_thickened(march_hit, traced);
+        } else if (march_hit.status == MarchStatus::kExhausted) {
+            traced.is_exhausted = true;
+        } else if (march_hit.status == MarchStatus::kHit) {
+            const double t = passage.t_min + march_hit.distance / passage.speed;
+            if (!(t <= passage.t_max)) continue;
+            if (any && placed.is_opaque_solid) {
+                traced.nearest.t = t;
+                traced.nearest.instance = passage.instance;
             } else {
-                if (kept != i) traced[kept] = traced[i];
-                ++kept;
+                work.met.push_back(static_cast<std::uint32_t>(i));
             }
         }
-        traced.resize(kept);
     }
+    work.surface.resize(work.met.size());
+    for (std::size_t i = 0; i < work.met.size(); ++i) {
+        add_surface_point(work.march_hits[work.met[i]], work.traced[work.active[work.met[i]]].passage, i,
+                          work.surface);
+    }
+    find_surface(atlas_.surface_table(), work.surface);
+    for (std::size_t i = 0; i < work.met.size(); ++i) {
+        finish_plain(work.march_hits[work.met[i]], work.surface, i, work.traced[work.active[work.met[i]]]);
+    }
+}
+
+void SdfTracer::trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any,
+                            Work& work) const {
+    work.active.clear();
+    for (std::size_t i = begin; i < end; ++i) {
+        const std::size_t slot = i - begin;
+        Traced& traced = work.traced[slot];
+        traced.ray = rays.get(i);
+        traced.steps = 0;
+        traced.is_exhausted = false;
+        traced.nearest.t = traced.ray.t_max;
+        traced.nearest.instance = core::kNoIndex;
+        if (!core::is_valid_ray(traced.ray)) continue;
+        work.walks[slot].start(tree_, glm::dvec3(traced.ray.origin), glm::dvec3(traced.ray.direction),
+                               traced.ray.t_min, traced.nearest.t);
+        if (enter_next_instance(traced, work.walks[slot])) {
+            work.active.push_back(static_cast<std::uint32_t>(slot));
+        }
+    }
+    while (!work.active.empty()) {
+        march_active(any, work);
+        std::erase_if(work.active, [&](std::uint32_t slot) {
+            Traced& traced = work.traced[slot];
+            return (any && traced.nearest.found()) || !enter_next_instance(traced, work.walks[slot]);
+        });
+    }
+    for (std::size_t slot = 0; slot < end - begin; ++slot) {
+        work.steps += work.traced[slot].steps;
+        work.exhausted += work.traced[slot].is_exhausted;
+    }
+}
+
+template <typename Finished>
+void SdfTracer::trace(const core::RayStream& rays, bool any, const Finished& finished) const {
+    Work work;
+    for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
+        const std::size_t end = std::min(begin + kBlockRays, rays.size());
+        trace_block(rays, begin, end, any, work);
+        for (std::size_t i = begin; i < end; ++i) finished(i, work.traced[i - begin]);
+    }
+    ray_count_.fetch_add(rays.size(), std::memory_order_relaxed);
+    step_count_.fetch_add(work.steps, std::memory_order_relaxed);
+    exhausted_count_.fetch_add(work.exhausted, std::memory_order_relaxed);
 }
 
 void SdfTracer::trace_closest(const core::RayStream& rays, core::HitStream& hits) const {
     hits.resize(rays.size());
-    Work work;
-    for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
-        trace_block(rays, begin, std::min(begin + kBlockRays, rays.size()), false, work,
-                    [&](const Traced& traced) {
-                        core::Hit hit;
-                        if (traced.nearest.found()) {
-                            hit = finish(traced);
-                        } else if (traced.is_exhausted) {
-                            hit.status = core::HitStatus::kExhausted;
-                        }
-                        hit.steps = traced.steps;
-                        hits.set(traced.number, hit);
-                    });
-    }
-    count(work);
+    trace(rays, false, [&](std::size_t i, const Traced& traced) { hits.set(i, finish(traced)); });
 }
 
 void SdfTracer::trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const {
     assert(occluded.size() == rays.size());
-    Work work;
-    for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
-        trace_block(rays, begin, std::min(begin + kBlockRays, rays.size()), true, work,
-                    [&](const Traced& traced) { occluded[traced.number] = traced.nearest.found() ? 1 : 0; });
-    }
-    count(work);
+    trace(rays, true,
+          [&](std::size_t i, const Traced& traced) { occluded[i] = traced.nearest.found() ? 1 : 0; });
 }
 
 float SdfTracer::start_offset(std::uint32_t instance) const {
     return placed_[instance].start_offset;
-}
-
-void SdfTracer::count(const Work& work) const {
-    ray_count_.fetch_add(work.rays, std::memory_order_relaxed);
-    step_count_.fetch_add(work.steps, std::memory_order_relaxed);
-    exhausted_count_.fetch_add(work.exhausted, std::memory_order_relaxed);
 }
 
 SdfTracer::Statistics SdfTracer::statistics() const {

@@ -61,9 +61,11 @@ private:
         FieldAtlas::Place place;
         const TriangleBvh* triangles = nullptr;  ///< Of the mesh, local units; null if nothing is thickened.
         glm::dmat3 voxel_from_world_direction{1.0};
-        glm::dvec3 voxel_origin{0.0};         ///< Voxel coordinates of the world's origin.
-        double world_from_voxel_scale = 1.0;  ///< Largest stretch of one voxel, in world units.
+        glm::mat3 world_from_voxel_gradient{1.0f};  ///< Up to a factor.
+        glm::dvec3 voxel_origin{0.0};               ///< Voxel coordinates of the world's origin.
+        double world_from_voxel_scale = 1.0;        ///< Largest stretch of one voxel, in world units.
         float start_offset = 0.0f;
+        bool is_opaque_solid = false;  ///< Every crossing is a visible surface.
     };
     struct LocalRay;
     struct Nearest;
@@ -71,28 +73,37 @@ private:
     struct Traced;
     struct Work;
 
-    /// The one path of both queries: traces a few rays together and calls finished(ray number, Traced&) for
-    /// each. Stops at any hit if `any`.
+    /// The one path of both queries: finished(ray number, Traced&) for each. Stops at any hit if `any`.
     template <typename Finished>
-    void trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any, Work& work,
-                     const Finished& finished) const;
+    void trace(const core::RayStream& rays, bool any, const Finished& finished) const;
+    /// Traces rays begin to end - 1 together.
+    void trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any,
+                     Work& work) const;
     /// Brings a ray to the next instance whose field it may meet; false once there is none.
-    bool enter_next_instance(Traced& traced) const;
-    /// The passage as the kernel takes it.
+    bool enter_next_instance(Traced& traced, InstanceTree::Walk& walk) const;
+    /// Takes all active rays through the field that each has come to.
+    void march_active(bool any, Work& work) const;
+    /// A passage as the kernel takes it.
     MarchRay march_ray(const Passage& passage) const;
-    /// Takes what the kernel found and looks for the first visible surface of the passage's instance.
-    void finish_passage(const MarchHit& march_hit, Traced& traced) const;
-    /// The same without a kernel, from crossing to crossing.
-    void walk_crossings(LocalRay& local, const Passage& passage, Nearest& found, Traced& traced) const;
+    void add_surface_point(const MarchHit& march_hit, const Passage& passage, std::size_t to,
+                           SurfacePoints& surface) const;
+    /// Takes what the kernels found in a field without thickened features.
+    void finish_plain(const MarchHit& march_hit, const SurfacePoints& surface, std::size_t at,
+                      Traced& traced) const;
+    /// The same for fields with such features, whose triangles decide.
+    void finish_thickened(const MarchHit& march_hit, Traced& traced) const;
+    /// Looks for the first visible surface without a kernel, from crossing to crossing.
+    void walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const;
+    LocalRay local_ray(const Traced& traced) const;
+    void keep_nearer(const Nearest& found, Traced& traced) const;
     /// Finds the triangle of a crossing; false where there is no visible surface.
     bool resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const;
     /// Finds the first visible triangle that the ray truly meets in [t_min, t_max].
     bool meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const;
     /// The normal that faces the ray: of the triangle itself, or of the field.
-    glm::dvec3 triangle_side(const core::Ray& ray, const Nearest& nearest) const;
-    glm::dvec3 field_side(const core::Ray& ray, const Nearest& nearest) const;
+    glm::vec3 triangle_side(const core::Ray& ray, const Nearest& nearest) const;
+    glm::vec3 field_side(const core::Ray& ray, const Nearest& nearest) const;
     core::Hit finish(const Traced& traced) const;
-    void count(const Work& work) const;
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;

@@ -1,0 +1,59 @@
+// sdf/surface_kernel.h: what lies at a crossing: the field's normal and the closest of the cell's triangles,
+// for many crossings at once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "core/trace/ray_stream.h"
+
+namespace sdf {
+
+/// A triangle in the voxels of its field.
+struct VoxelTriangle {
+    float a[3];          ///< First corner.
+    float ab[3], ac[3];  ///< To the second and the third.
+};
+
+/// A gradient of the field in one word: three components of 10 bits, in steps of kGradientStep.
+inline constexpr float kGradientStep = 1.0f / 400.0f;
+std::int32_t stored_gradient(const glm::dvec3& gradient);
+
+/// What the samples of all fields know besides their distance; one entry a sample, as in Brick.
+struct SurfaceTable {
+    const std::int32_t* gradients = nullptr;
+    const std::uint16_t* palette_entries = nullptr;  ///< One more entry than there are samples.
+    const std::int32_t* palette_first = nullptr;     ///< By brick.
+    const std::int32_t* palettes = nullptr;          ///< Triangles, numbered over all fields.
+    const VoxelTriangle* triangles = nullptr;
+};
+
+/// Crossings and what was found there, one column a component, padded to whole vectors.
+struct SurfacePoints {
+    // In.
+    core::Column<float> x, y, z;                 ///< Voxel coordinates.
+    core::Column<std::int32_t> brick;            ///< Over all fields.
+    core::Column<float> cell_x, cell_y, cell_z;  ///< The cell's lowest corner, voxel coordinates.
+    core::Column<std::int32_t> first_sample;     ///< Of the cell, within its brick.
+    // Out.
+    core::Column<float> gradient_x, gradient_y, gradient_z;  ///< Of the field, in voxels.
+    core::Column<std::int32_t>
+        triangle;              ///< The closest of the cell's corners' triangles; -1: they name none.
+    core::Column<float> u, v;  ///< Barycentrics of its closest point: second and third corner.
+    core::Column<float> distance_squared;  ///< From that point, voxels.
+
+    std::size_t size() const { return size_; }
+    /// Padding is filled with crossings of the first brick.
+    void resize(std::size_t count);
+
+private:
+    std::size_t size_ = 0;
+};
+
+/// Fills the columns marked Out. The gradient is the trilinear mean of the corners' gradients; among equally
+/// close triangles the lowest number wins. Same bits on every instruction set.
+void find_surface(const SurfaceTable& table, SurfacePoints& points);
+
+}  // namespace sdf
