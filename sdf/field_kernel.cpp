@@ -1,6 +1,7 @@
 #include "sdf/field_kernel.h"
 
 #include <cstdint>
+#include <vector>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sdf/field_kernel.cpp"
@@ -37,21 +38,26 @@ constexpr float kHuge = 1e30f;
 struct alignas(64) Packet {
     float ox[kMostLanes], oy[kMostLanes], oz[kMostLanes];
     float dx[kMostLanes], dy[kMostLanes], dz[kMostLanes];
-    float ix[kMostLanes], iy[kMostLanes], iz[kMostLanes];
+    float ix[kMostLanes], iy[kMostLanes], iz[kMostLanes];  ///< 1 / direction.
     float length[kMostLanes];
     float count_x[kMostLanes], count_y[kMostLanes], count_z[kMostLanes];
     std::int32_t top_base[kMostLanes], stride_x[kMostLanes], stride_y[kMostLanes];
-    // What changes as the ray goes on.
+    // Where the ray has come to.
     float s[kMostLanes];
     float cx[kMostLanes], cy[kMostLanes], cz[kMostLanes];
-    float sign[kMostLanes];  ///< +1 or -1 once the ray has come to a brick; 0 before.
+    float sign[kMostLanes];      ///< +1 or -1 once the ray has come to a brick; 0 before.
+    float searched[kMostLanes];  ///< 1 where its cell is known to hold no crossing.
     std::int32_t steps[kMostLanes];
-    std::int32_t cap[kMostLanes];
-    std::uint32_t ray[kMostLanes];
-    bool busy[kMostLanes];
-    // What the last step found.
+    std::int32_t step_cap[kMostLanes];
+    // What fetch() found there.
+    float block_x[kMostLanes], block_y[kMostLanes], block_z[kMostLanes];  ///< Lowest corner.
+    std::int32_t entry[kMostLanes];
+    std::int32_t w00[kMostLanes], w01[kMostLanes], w10[kMostLanes], w11[kMostLanes];  ///< Along x and y.
+    // What advance() found.
     float hit_s[kMostLanes];
-    std::int32_t brick[kMostLanes];
+
+    std::uint32_t ray[kMostLanes];
+    bool is_busy[kMostLanes];
 };
 
 /// The eight corners of a cell, in steps of the samples.
@@ -139,20 +145,12 @@ HWY_INLINE HWY_ATTR Floats first_root(const CubicLanes& cubic, Mask negative, Ma
     return s;
 }
 
-/// Takes one step with every lane. Lanes that end are marked in the result: hit, or gone.
-struct StepResult {
-    Mask hit, gone, exhausted;
-};
-
-template <HitMode kMode>
-HWY_INLINE HWY_ATTR StepResult step(const FieldTable& fields, Packet& p) {
-    const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f), seven = hn::Set(kFloat, kBlockCells);
+/// Where the lanes' cells lie, and the samples at their corners. Nothing waits for what is read here before
+/// the next call of advance(): between them the other packet computes.
+HWY_INLINE HWY_ATTR void fetch(const FieldTable& fields, Packet& p) {
     const Floats cx = hn::Load(kFloat, p.cx), cy = hn::Load(kFloat, p.cy), cz = hn::Load(kFloat, p.cz);
-    const Floats ox = hn::Load(kFloat, p.ox), oy = hn::Load(kFloat, p.oy), oz = hn::Load(kFloat, p.oz);
-    const Floats dx = hn::Load(kFloat, p.dx), dy = hn::Load(kFloat, p.dy), dz = hn::Load(kFloat, p.dz);
-    const Floats s = hn::Load(kFloat, p.s);
-
-    const Floats seventh = hn::Set(kFloat, 1.0f / kBlockCells), half = hn::Set(kFloat, 0.5f);
+    const Floats seven = hn::Set(kFloat, kBlockCells), seventh = hn::Set(kFloat, 1.0f / kBlockCells),
+                 half = hn::Set(kFloat, 0.5f);
     const Floats bx = hn::Floor((cx + half) * seventh), by = hn::Floor((cy + half) * seventh),
                  bz = hn::Floor((cz + half) * seventh);
     const Floats block_x = bx * seven, block_y = by * seven, block_z = bz * seven;
@@ -160,178 +158,254 @@ HWY_INLINE HWY_ATTR StepResult step(const FieldTable& fields, Packet& p) {
                            hn::ConvertTo(kInt, by) * hn::Load(kInt, p.stride_y) +
                            (hn::ConvertTo(kInt, bz) + hn::Load(kInt, p.top_base));
     const Ints entry = hn::GatherIndex(kInt, fields.top, top_index);
-    const auto is_empty_int = hn::Lt(entry, hn::Zero(kInt));
-    const Mask is_empty = hn::RebindMask(kFloat, is_empty_int);
+    const Floats in_brick =
+        ((cx - block_x) * hn::Set(kFloat, 64.0f) + (cy - block_y) * hn::Set(kFloat, 8.0f)) + (cz - block_z);
+    // Empty blocks read the first brick.
+    const Ints offset = hn::IfThenZeroElse(
+        hn::Lt(entry, hn::Zero(kInt)),
+        hn::ShiftLeft<kLogBrickBytes>(entry) + hn::ShiftLeft<1>(hn::ConvertTo(kInt, in_brick)));
+    // Two samples along z in a word.
+    const auto* base = reinterpret_cast<const std::int32_t*>(fields.samples);
+    hn::Store(block_x, kFloat, p.block_x);
+    hn::Store(block_y, kFloat, p.block_y);
+    hn::Store(block_z, kFloat, p.block_z);
+    hn::Store(entry, kInt, p.entry);
+    hn::Store(hn::GatherOffset(kInt, base, offset), kInt, p.w00);
+    hn::Store(hn::GatherOffset(kInt, base, offset + hn::Set(kInt, kSampleBytesY)), kInt, p.w01);
+    hn::Store(hn::GatherOffset(kInt, base, offset + hn::Set(kInt, kSampleBytesX)), kInt, p.w10);
+    hn::Store(hn::GatherOffset(kInt, base, offset + hn::Set(kInt, kSampleBytesX + kSampleBytesY)), kInt,
+              p.w11);
+}
 
-    // The region that has one answer: the whole block where it is empty, else the cell.
-    const Floats low_x = hn::IfThenElse(is_empty, block_x, cx), low_y = hn::IfThenElse(is_empty, block_y, cy),
-                 low_z = hn::IfThenElse(is_empty, block_z, cz);
-    const Floats size = hn::IfThenElse(is_empty, seven, one);
-    const Mask up_x = hn::Ge(dx, zero), up_y = hn::Ge(dy, zero), up_z = hn::Ge(dz, zero);
-    const Floats plane_x = low_x + hn::IfThenElseZero(up_x, size),
-                 plane_y = low_y + hn::IfThenElseZero(up_y, size),
-                 plane_z = low_z + hn::IfThenElseZero(up_z, size);
-    const Floats exit_x = (plane_x - ox) * hn::Load(kFloat, p.ix),
-                 exit_y = (plane_y - oy) * hn::Load(kFloat, p.iy),
-                 exit_z = (plane_z - oz) * hn::Load(kFloat, p.iz);
-    const Floats exit = hn::Max(s, hn::Min(exit_x, hn::Min(exit_y, exit_z)));
+HWY_INLINE HWY_ATTR Corners load_corners(const Packet& p) {
+    const Ints w00 = hn::Load(kInt, p.w00), w01 = hn::Load(kInt, p.w01), w10 = hn::Load(kInt, p.w10),
+               w11 = hn::Load(kInt, p.w11);
+    const auto low_half = [](Ints word) HWY_ATTR {
+        return hn::ConvertTo(kFloat, hn::ShiftRight<16>(hn::ShiftLeft<16>(word)));
+    };
+    const auto high_half = [](Ints word) HWY_ATTR { return hn::ConvertTo(kFloat, hn::ShiftRight<16>(word)); };
+    return {low_half(w00), high_half(w00), low_half(w01), high_half(w01),
+            low_half(w10), high_half(w10), low_half(w11), high_half(w11)};
+}
+
+/// A place within a cell, each coordinate in [0, 1].
+struct Place {
+    Floats x, y, z;
+};
+
+HWY_INLINE HWY_ATTR Floats unit_clamped(Floats x) {
+    return hn::Min(hn::Max(x, hn::Zero(kFloat)), hn::Set(kFloat, 1.0f));
+}
+
+HWY_INLINE HWY_ATTR Place place_at(const Packet& p, Floats s) {
+    return {unit_clamped(hn::Load(kFloat, p.ox) + s * hn::Load(kFloat, p.dx) - hn::Load(kFloat, p.cx)),
+            unit_clamped(hn::Load(kFloat, p.oy) + s * hn::Load(kFloat, p.dy) - hn::Load(kFloat, p.cy)),
+            unit_clamped(hn::Load(kFloat, p.oz) + s * hn::Load(kFloat, p.dz) - hn::Load(kFloat, p.cz))};
+}
+
+/// Where the rays leave the region that has one answer: the whole block where it is empty, else the cell.
+struct Exit {
+    Floats low_x, low_y, low_z, size;  ///< The region.
+    Mask up_x, up_y, up_z;             ///< Which way the ray goes.
+    Floats x, y, z;                    ///< Distance to the region's planes.
+    Floats nearest;                    ///< The least of them, but not before s.
+};
+
+HWY_INLINE HWY_ATTR Exit exit_of(const Packet& p, Mask is_empty, Floats s) {
+    const Floats zero = hn::Zero(kFloat);
+    Exit exit;
+    exit.low_x = hn::IfThenElse(is_empty, hn::Load(kFloat, p.block_x), hn::Load(kFloat, p.cx));
+    exit.low_y = hn::IfThenElse(is_empty, hn::Load(kFloat, p.block_y), hn::Load(kFloat, p.cy));
+    exit.low_z = hn::IfThenElse(is_empty, hn::Load(kFloat, p.block_z), hn::Load(kFloat, p.cz));
+    exit.size = hn::IfThenElse(is_empty, hn::Set(kFloat, kBlockCells), hn::Set(kFloat, 1.0f));
+    exit.up_x = hn::Ge(hn::Load(kFloat, p.dx), zero);
+    exit.up_y = hn::Ge(hn::Load(kFloat, p.dy), zero);
+    exit.up_z = hn::Ge(hn::Load(kFloat, p.dz), zero);
+    exit.x = (exit.low_x + hn::IfThenElseZero(exit.up_x, exit.size) - hn::Load(kFloat, p.ox)) *
+             hn::Load(kFloat, p.ix);
+    exit.y = (exit.low_y + hn::IfThenElseZero(exit.up_y, exit.size) - hn::Load(kFloat, p.oy)) *
+             hn::Load(kFloat, p.iy);
+    exit.z = (exit.low_z + hn::IfThenElseZero(exit.up_z, exit.size) - hn::Load(kFloat, p.oz)) *
+             hn::Load(kFloat, p.iz);
+    exit.nearest = hn::Max(s, hn::Min(exit.x, hn::Min(exit.y, exit.z)));
+    return exit;
+}
+
+/// The lanes that a step ends: with a hit, with a cell to be searched for one, or with nothing.
+struct Ended {
+    Mask hit, candidate, gone, exhausted;
+};
+
+/// Takes one step with every lane, from what fetch() read.
+template <HitMode kMode>
+HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
+    const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f);
+    const Floats s = hn::Load(kFloat, p.s);
+    const Ints entry = hn::Load(kInt, p.entry);
+    const Mask is_empty = hn::RebindMask(kFloat, hn::Lt(entry, hn::Zero(kInt)));
+    const Exit exit = exit_of(p, is_empty, s);
+    const Mask no_lane = hn::Lt(zero, zero);
+    Ended ended{no_lane, no_lane, no_lane, no_lane};
 
     Floats reach =
         hn::ConvertTo(kFloat, hn::Zero(kInt) - (entry + hn::Set(kInt, 1))) * hn::Set(kFloat, 1.0f / 64.0f);
-    const Mask no_lane = hn::Lt(zero, zero);
-    StepResult result{no_lane, no_lane, no_lane};
     if (!hn::AllTrue(kFloat, is_empty)) {
-        const Floats in_brick =
-            ((cx - block_x) * hn::Set(kFloat, 64.0f) + (cy - block_y) * hn::Set(kFloat, 8.0f)) +
-            (cz - block_z);
-        const Ints offset =
-            hn::IfThenZeroElse(is_empty_int, hn::ShiftLeft<kLogBrickBytes>(entry) +
-                                                 hn::ShiftLeft<1>(hn::ConvertTo(kInt, in_brick)));
-        // Two samples along z in a word.
-        const auto* base = reinterpret_cast<const std::int32_t*>(fields.samples);
-        const Ints w00 = hn::GatherOffset(kInt, base, offset);
-        const Ints w01 = hn::GatherOffset(kInt, base, offset + hn::Set(kInt, kSampleBytesY));
-        const Ints w10 = hn::GatherOffset(kInt, base, offset + hn::Set(kInt, kSampleBytesX));
-        const Ints w11 = hn::GatherOffset(kInt, base, offset + hn::Set(kInt, kSampleBytesX + kSampleBytesY));
-        const auto low_half = [](Ints word) HWY_ATTR {
-            return hn::ConvertTo(kFloat, hn::ShiftRight<16>(hn::ShiftLeft<16>(word)));
-        };
-        const auto high_half = [](Ints word)
-                                   HWY_ATTR { return hn::ConvertTo(kFloat, hn::ShiftRight<16>(word)); };
-        const Corners corners{low_half(w00), high_half(w00), low_half(w01), high_half(w01),
-                              low_half(w10), high_half(w10), low_half(w11), high_half(w11)};
-        const Floats ux = hn::Min(hn::Max(ox + s * dx - cx, zero), one),
-                     uy = hn::Min(hn::Max(oy + s * dy - cy, zero), one),
-                     uz = hn::Min(hn::Max(oz + s * dz - cz, zero), one);
-        const Floats value = corners.at(ux, uy, uz);
+        const Mask in_cell = hn::Not(is_empty);
+        const Corners corners = load_corners(p);
+        const Place near = place_at(p, s);
+        const Floats value = corners.at(near.x, near.y, near.z);
         const Floats old_sign = hn::Load(kFloat, p.sign);
-        const Floats sign_here = hn::CopySign(one, value);
-        const Mask sign_unknown = hn::Eq(old_sign, zero);
-        const Floats sign =
-            hn::IfThenElse(is_empty, old_sign, hn::IfThenElse(sign_unknown, sign_here, old_sign));
+        const Mask begins = hn::AndNot(is_empty, hn::Eq(old_sign, zero));
+        const Floats sign = hn::IfThenElse(begins, hn::CopySign(one, value), old_sign);
         hn::Store(sign, kFloat, p.sign);
         const Mask negative = is_negative(sign);
 
         // Bits 15 and 31 are the signs of a word's two samples.
+        const Ints w00 = hn::Load(kInt, p.w00), w01 = hn::Load(kInt, p.w01), w10 = hn::Load(kInt, p.w10),
+                   w11 = hn::Load(kInt, p.w11);
         const Ints signs = hn::Set(kInt, static_cast<std::int32_t>(0x80008000u));
         const Ints any_negative = hn::And(hn::Or(hn::Or(w00, w01), hn::Or(w10, w11)), signs);
         const Ints all_negative = hn::And(hn::And(hn::And(w00, w01), hn::And(w10, w11)), signs);
-        const auto none = hn::Eq(any_negative, hn::Zero(kInt));
-        const auto all = hn::Eq(all_negative, signs);
-        const Mask uniform = hn::RebindMask(kFloat, hn::Or(none, all));
-        const Mask in_cell = hn::Not(is_empty);
+        const Mask all = hn::RebindMask(kFloat, hn::Eq(all_negative, signs));
+        const Mask uniform = hn::Or(hn::RebindMask(kFloat, hn::Eq(any_negative, hn::Zero(kInt))), all);
         // A cell of one sign that is not the ray's: the change lay in the face, and rounding hid it.
-        const Mask past = hn::And(in_cell, hn::And(uniform, differ(hn::RebindMask(kFloat, all), negative)));
-        const Mask mixed = hn::AndNot(uniform, in_cell);
+        ended.hit = hn::And(in_cell, hn::And(uniform, differ(all, negative)));
+        Floats hit_s = s;
 
         const Floats step_voxels = hn::Set(kFloat, kSampleStepVoxels);
-        const Floats part = (exit - s);
-        Floats hit_s = s;
-        Mask hit = past;
-        if constexpr (kMode == HitMode::kCubic) {
-            if (!hn::AllFalse(kFloat, mixed)) {
-                const Floats fx = hn::Min(hn::Max(ux + part * dx, zero), one),
-                             fy = hn::Min(hn::Max(uy + part * dy, zero), one),
-                             fz = hn::Min(hn::Max(uz + part * dz, zero), one);
-                Mask found;
-                const CubicLanes cubic = cubic_along(corners, ux, uy, uz, fx - ux, fy - uy, fz - uz);
-                const Floats root = first_root(cubic, negative, found);
-                found = hn::And(found, mixed);
-                hit_s = hn::IfThenElse(found, s + root * part, hit_s);
-                hit = hn::Or(hit, found);
-            }
-        } else if constexpr (kMode == HitMode::kSecant) {
-            if (!hn::AllFalse(kFloat, mixed)) {
-                const Floats fx = hn::Min(hn::Max(ux + part * dx, zero), one),
-                             fy = hn::Min(hn::Max(uy + part * dy, zero), one),
-                             fz = hn::Min(hn::Max(uz + part * dz, zero), one);
-                const Floats gx = fx - ux, gy = fy - uy, gz = fz - uz;
-                const Floats far_value = corners.at(fx, fy, fz);
-                const Mask near_found = differ(is_negative(value), negative);
-                const Mask found =
-                    hn::And(mixed, hn::Or(near_found, differ(is_negative(far_value), negative)));
-                Floats low = zero, high = one, at_low = value, at_high = far_value, root = zero;
-                constexpr int kFalsePositions = 3;
-                for (int i = 0; i < kFalsePositions; ++i) {
-                    root = low + (high - low) * (at_low / (at_low - at_high));
-                    if (i + 1 == kFalsePositions) break;
-                    const Floats at_root = corners.at(ux + root * gx, uy + root * gy, uz + root * gz);
-                    const Mask before = hn::Not(differ(is_negative(at_root), negative));
-                    low = hn::IfThenElse(before, root, low);
-                    at_low = hn::IfThenElse(before, at_root, at_low);
-                    high = hn::IfThenElse(before, high, root);
-                    at_high = hn::IfThenElse(before, at_high, at_root);
-                }
-                root = hn::IfThenElse(near_found, zero, root);
-                hit_s = hn::IfThenElse(found, s + root * part, hit_s);
-                hit = hn::Or(hit, found);
-            }
-        } else {
+        Floats safe = hn::Abs(value) * (step_voxels * hn::Set(kFloat, kSafePart));
+        if constexpr (kMode == HitMode::kEps) {
             // Distance to the surface ahead; the slope tells whether the ray comes nearer at all.
             const Floats ahead = value * sign;
-            const Mask near = hn::And(in_cell, hn::Lt(ahead * step_voxels, hn::Set(kFloat, kHitEpsVoxels)));
-            if (!hn::AllFalse(kFloat, near)) {
+            const Mask is_near =
+                hn::And(in_cell, hn::Lt(ahead * step_voxels, hn::Set(kFloat, kHitEpsVoxels)));
+            if (!hn::AllFalse(kFloat, is_near)) {
                 const Floats look = hn::Set(kFloat, 0.25f);
-                const Floats later = corners.at(ux + look * dx, uy + look * dy, uz + look * dz) * sign;
+                const Floats later =
+                    corners.at(near.x + look * hn::Load(kFloat, p.dx), near.y + look * hn::Load(kFloat, p.dy),
+                               near.z + look * hn::Load(kFloat, p.dz)) *
+                    sign;
                 const Mask closing = hn::Lt(later, ahead);
                 const Floats further = look * ahead / (ahead - later);
-                const Mask found = hn::Or(hn::And(hn::And(near, closing), hn::Lt(further, one)),
-                                          hn::And(near, hn::Lt(ahead, zero)));
-                hit_s = hn::IfThenElse(found, s + hn::Max(zero, hn::Min(further, one)), hit_s);
-                hit = hn::Or(hit, found);
+                const Mask found =
+                    hn::And(is_near, hn::Or(hn::And(closing, hn::Lt(further, one)), hn::Lt(ahead, zero)));
+                hit_s = hn::IfThenElse(found, s + unit_clamped(further), hit_s);
+                ended.hit = hn::Or(ended.hit, found);
+            }
+        } else {
+            const Mask mixed =
+                hn::AndNot(hn::Or(uniform, is_empty), hn::Eq(hn::Load(kFloat, p.searched), zero));
+            safe = hn::IfThenElseZero(uniform, safe);
+            if (!hn::AllFalse(kFloat, mixed)) {
+                const Place far = place_at(p, exit.nearest);
+                Mask may_cross;
+                if constexpr (kMode == HitMode::kSecant) {
+                    const Floats far_value = corners.at(far.x, far.y, far.z);
+                    may_cross = hn::Or(differ(is_negative(value), negative),
+                                       differ(is_negative(far_value), negative));
+                } else {
+                    // The cubic lies within the hull of its Bernstein coefficients.
+                    const CubicLanes cubic = cubic_along(corners, near.x, near.y, near.z, far.x - near.x,
+                                                         far.y - near.y, far.z - near.z);
+                    const Floats third = hn::Set(kFloat, 1.0f / 3.0f);
+                    const Floats b1 = cubic.c0 + third * cubic.c1;
+                    const Floats b2 = b1 + third * (cubic.c1 + cubic.c2);
+                    const Floats b3 = cubic.at(one);
+                    may_cross = hn::Or(
+                        hn::Or(differ(is_negative(value), negative), differ(is_negative(b1), negative)),
+                        hn::Or(differ(is_negative(b2), negative), differ(is_negative(b3), negative)));
+                }
+                ended.candidate = hn::And(mixed, may_cross);
             }
         }
-        hit = hn::And(hit, hn::Le(hit_s, hn::Load(kFloat, p.length)));
-        result.hit = hit;
+        ended.hit = hn::And(ended.hit, hn::Le(hit_s, hn::Load(kFloat, p.length)));
         hn::Store(hit_s, kFloat, p.hit_s);
-        hn::Store(entry, kInt, p.brick);
-        Floats safe = hn::Abs(value) * (step_voxels * hn::Set(kFloat, kSafePart));
-        if constexpr (kMode != HitMode::kEps) safe = hn::IfThenElseZero(uniform, safe);
         reach = hn::IfThenElse(is_empty, reach, safe);
     }
 
     // On, as far as nothing can be met.
     const Floats safe_s = s + (reach - hn::Set(kFloat, kStepMargin));
-    const Mask jumps = hn::Gt(safe_s, exit);
-    const Floats next = hn::IfThenElse(jumps, safe_s, exit);
-    const Floats px = hn::Floor(ox + next * dx), py = hn::Floor(oy + next * dy),
-                 pz = hn::Floor(oz + next * dz);
+    const Mask jumps = hn::Gt(safe_s, exit.nearest);
+    const Floats next = hn::IfThenElse(jumps, safe_s, exit.nearest);
     const Floats count_x = hn::Load(kFloat, p.count_x), count_y = hn::Load(kFloat, p.count_y),
                  count_z = hn::Load(kFloat, p.count_z);
-    const Floats from_x = hn::IfThenZeroElse(jumps, low_x), from_y = hn::IfThenZeroElse(jumps, low_y),
-                 from_z = hn::IfThenZeroElse(jumps, low_z);
-    const Floats to_x = hn::IfThenElse(jumps, count_x, low_x + size) - one,
-                 to_y = hn::IfThenElse(jumps, count_y, low_y + size) - one,
-                 to_z = hn::IfThenElse(jumps, count_z, low_z + size) - one;
-    Floats next_x = hn::Min(hn::Max(px, from_x), to_x), next_y = hn::Min(hn::Max(py, from_y), to_y),
-           next_z = hn::Min(hn::Max(pz, from_z), to_z);
+    const auto cell_after = [&](const float* origin, const float* direction, Floats low,
+                                Floats count) HWY_ATTR {
+        const Floats cell = hn::Floor(hn::Load(kFloat, origin) + next * hn::Load(kFloat, direction));
+        const Floats from = hn::IfThenZeroElse(jumps, low);
+        const Floats to = hn::IfThenElse(jumps, count, low + exit.size) - one;
+        return hn::Min(hn::Max(cell, from), to);
+    };
+    Floats next_x = cell_after(p.ox, p.dx, exit.low_x, count_x),
+           next_y = cell_after(p.oy, p.dy, exit.low_y, count_y),
+           next_z = cell_after(p.oz, p.dz, exit.low_z, count_z);
     // Through a face: the neighbour across it, by number and not by position.
-    const Mask across_x = hn::AndNot(jumps, hn::And(hn::Le(exit_x, exit_y), hn::Le(exit_x, exit_z)));
-    const Mask across_y = hn::AndNot(hn::Or(jumps, across_x), hn::Le(exit_y, exit_z));
-    const Mask across_z = hn::AndNot(hn::Or(jumps, hn::Or(across_x, across_y)), hn::Eq(zero, zero));
-    next_x = hn::IfThenElse(across_x, hn::IfThenElse(up_x, low_x + size, low_x - one), next_x);
-    next_y = hn::IfThenElse(across_y, hn::IfThenElse(up_y, low_y + size, low_y - one), next_y);
-    next_z = hn::IfThenElse(across_z, hn::IfThenElse(up_z, low_z + size, low_z - one), next_z);
+    const Mask across_x = hn::AndNot(jumps, hn::And(hn::Le(exit.x, exit.y), hn::Le(exit.x, exit.z)));
+    const Mask across_y = hn::AndNot(hn::Or(jumps, across_x), hn::Le(exit.y, exit.z));
+    const Mask across_z = hn::Not(hn::Or(jumps, hn::Or(across_x, across_y)));
+    next_x =
+        hn::IfThenElse(across_x, hn::IfThenElse(exit.up_x, exit.low_x + exit.size, exit.low_x - one), next_x);
+    next_y =
+        hn::IfThenElse(across_y, hn::IfThenElse(exit.up_y, exit.low_y + exit.size, exit.low_y - one), next_y);
+    next_z =
+        hn::IfThenElse(across_z, hn::IfThenElse(exit.up_z, exit.low_z + exit.size, exit.low_z - one), next_z);
 
     const Ints steps = hn::Load(kInt, p.steps) + hn::Set(kInt, 1);
     hn::Store(steps, kInt, p.steps);
+    const Mask stays = hn::Or(ended.hit, ended.candidate);
     const Mask inside = hn::And(hn::And(hn::Ge(next_x, zero), hn::Lt(next_x, count_x)),
                                 hn::And(hn::And(hn::Ge(next_y, zero), hn::Lt(next_y, count_y)),
                                         hn::And(hn::Ge(next_z, zero), hn::Lt(next_z, count_z))));
-    const Mask on = hn::And(inside, hn::Lt(next, hn::Load(kFloat, p.length)));
-    result.gone = hn::AndNot(result.hit, hn::Not(on));
-    result.exhausted = hn::AndNot(hn::Or(result.hit, result.gone),
-                                  hn::RebindMask(kFloat, hn::Gt(steps, hn::Load(kInt, p.cap))));
-    // A hit keeps its cell.
-    const Mask moves = hn::Not(result.hit);
-    hn::Store(hn::IfThenElse(moves, next, s), kFloat, p.s);
-    hn::Store(hn::IfThenElse(moves, next_x, cx), kFloat, p.cx);
-    hn::Store(hn::IfThenElse(moves, next_y, cy), kFloat, p.cy);
-    hn::Store(hn::IfThenElse(moves, next_z, cz), kFloat, p.cz);
-    return result;
+    const Mask goes_on = hn::And(inside, hn::Lt(next, hn::Load(kFloat, p.length)));
+    ended.gone = hn::Not(hn::Or(stays, goes_on));
+    ended.exhausted = hn::AndNot(hn::Or(stays, ended.gone),
+                                 hn::RebindMask(kFloat, hn::Gt(steps, hn::Load(kInt, p.step_cap))));
+    hn::Store(hn::IfThenElse(stays, s, next), kFloat, p.s);
+    hn::Store(hn::IfThenElse(stays, hn::Load(kFloat, p.cx), next_x), kFloat, p.cx);
+    hn::Store(hn::IfThenElse(stays, hn::Load(kFloat, p.cy), next_y), kFloat, p.cy);
+    hn::Store(hn::IfThenElse(stays, hn::Load(kFloat, p.cz), next_z), kFloat, p.cz);
+    hn::Store(zero, kFloat, p.searched);
+    return ended;
 }
 
-/// Gives a lane its next ray.
+/// Looks for the crossing in the lanes' cells. @returns the lanes that have one, at p.hit_s
+template <HitMode kMode>
+HWY_INLINE HWY_ATTR Mask search_cell(Packet& p) {
+    const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f);
+    const Floats s = hn::Load(kFloat, p.s);
+    const Corners corners = load_corners(p);
+    const Floats part = exit_of(p, hn::Lt(zero, zero), s).nearest - s;
+    const Place near = place_at(p, s), far = place_at(p, s + part);
+    const Floats gx = far.x - near.x, gy = far.y - near.y, gz = far.z - near.z;
+    const Mask negative = is_negative(hn::Load(kFloat, p.sign));
+    Mask found;
+    Floats root;
+    if constexpr (kMode == HitMode::kCubic) {
+        root = first_root(cubic_along(corners, near.x, near.y, near.z, gx, gy, gz), negative, found);
+    } else {
+        Floats low = zero, high = one, at_low = corners.at(near.x, near.y, near.z),
+               at_high = corners.at(far.x, far.y, far.z);
+        const Mask at_once = differ(is_negative(at_low), negative);
+        found = hn::Or(at_once, differ(is_negative(at_high), negative));
+        constexpr int kFalsePositions = 3;
+        root = zero;
+        for (int i = 0; i < kFalsePositions; ++i) {
+            root = low + (high - low) * (at_low / (at_low - at_high));
+            const Floats at_root = corners.at(near.x + root * gx, near.y + root * gy, near.z + root * gz);
+            const Mask before = hn::Not(differ(is_negative(at_root), negative));
+            low = hn::IfThenElse(before, root, low);
+            at_low = hn::IfThenElse(before, at_root, at_low);
+            high = hn::IfThenElse(before, high, root);
+            at_high = hn::IfThenElse(before, at_high, at_root);
+        }
+        root = hn::IfThenZeroElse(at_once, root);
+    }
+    const Floats hit_s = s + root * part;
+    hn::Store(hit_s, kFloat, p.hit_s);
+    return found;
+}
+
+/// Gives a lane a ray, at its origin.
 HWY_INLINE HWY_ATTR void load_lane(Packet& p, std::size_t lane, const MarchRay& ray, std::uint32_t number) {
     const auto inverse = [](float d) { return d == 0.0f ? kHuge : 1.0f / d; };
     p.ox[lane] = ray.origin[0];
@@ -350,6 +424,8 @@ HWY_INLINE HWY_ATTR void load_lane(Packet& p, std::size_t lane, const MarchRay& 
     p.top_base[lane] = ray.top_base;
     p.stride_x[lane] = ray.top_stride_x;
     p.stride_y[lane] = ray.top_stride_y;
+    p.step_cap[lane] = static_cast<std::int32_t>(
+        2.0f * (ray.cell_count[0] + ray.cell_count[1] + ray.cell_count[2]) + 256.0f);
     p.s[lane] = 0.0f;
     const auto cell = [](float position, float count) {
         const auto whole = static_cast<float>(static_cast<std::int32_t>(position));
@@ -359,14 +435,24 @@ HWY_INLINE HWY_ATTR void load_lane(Packet& p, std::size_t lane, const MarchRay& 
     p.cy[lane] = cell(ray.origin[1], ray.cell_count[1]);
     p.cz[lane] = cell(ray.origin[2], ray.cell_count[2]);
     p.sign[lane] = 0.0f;
+    p.searched[lane] = 0.0f;
     p.steps[lane] = 0;
-    p.cap[lane] = static_cast<std::int32_t>(
-        2.0f * (ray.cell_count[0] + ray.cell_count[1] + ray.cell_count[2]) + 256.0f);
     p.ray[lane] = number;
-    p.busy[lane] = true;
+    p.is_busy[lane] = true;
 }
 
-/// A lane without a ray: it stands in the first block of whatever its last ray was in and never ends.
+/// Puts a lane where its ray was left, in a cell that may hold a crossing.
+HWY_INLINE HWY_ATTR void resume_lane(Packet& p, std::size_t lane, const MarchHit& at, bool is_searched) {
+    p.s[lane] = at.distance;
+    p.cx[lane] = at.cell[0];
+    p.cy[lane] = at.cell[1];
+    p.cz[lane] = at.cell[2];
+    p.sign[lane] = at.enters_negative ? 1.0f : -1.0f;
+    p.steps[lane] = static_cast<std::int32_t>(at.steps);
+    p.searched[lane] = is_searched ? 1.0f : 0.0f;
+}
+
+/// A lane without a ray: it stands still in the first block of all and never ends.
 HWY_INLINE HWY_ATTR void idle_lane(Packet& p, std::size_t lane) {
     p.ox[lane] = p.oy[lane] = p.oz[lane] = 0.0f;
     p.dx[lane] = p.dy[lane] = p.dz[lane] = 0.0f;
@@ -374,73 +460,132 @@ HWY_INLINE HWY_ATTR void idle_lane(Packet& p, std::size_t lane) {
     p.length[lane] = kHuge;
     p.count_x[lane] = p.count_y[lane] = p.count_z[lane] = kHuge;
     p.top_base[lane] = p.stride_x[lane] = p.stride_y[lane] = 0;
+    p.step_cap[lane] = 0x7fffffff;
     p.s[lane] = p.cx[lane] = p.cy[lane] = p.cz[lane] = 0.0f;
     p.sign[lane] = 1.0f;
+    p.searched[lane] = 0.0f;
     p.steps[lane] = 0;
-    p.cap[lane] = 0x7fffffff;
-    p.busy[lane] = false;
+    p.ray[lane] = 0;
+    p.is_busy[lane] = false;
+}
+
+HWY_INLINE HWY_ATTR std::uint64_t bits_of(Mask mask) {
+    std::uint64_t bits = 0;
+    hn::StoreMaskBits(kFloat, mask, reinterpret_cast<std::uint8_t*>(&bits));
+    return bits;
+}
+
+HWY_INLINE HWY_ATTR void store_lane(const Packet& p, std::size_t lane, MarchStatus status, float distance,
+                                    MarchHit& hit) {
+    hit.distance = distance;
+    hit.brick = p.entry[lane];
+    hit.cell[0] = static_cast<std::int16_t>(p.cx[lane]);
+    hit.cell[1] = static_cast<std::int16_t>(p.cy[lane]);
+    hit.cell[2] = static_cast<std::int16_t>(p.cz[lane]);
+    hit.status = status;
+    hit.enters_negative = p.sign[lane] > 0.0f;
+    hit.steps = static_cast<std::uint32_t>(p.steps[lane]);
+}
+
+/// Walks rays until each has ended or has come to a cell that must be searched.
+/// @param resumed those to go on with, from such a cell; null: all `count` from their origins
+template <HitMode kMode>
+HWY_INLINE HWY_ATTR void walk(const FieldTable& fields, const MarchRay* rays, MarchHit* hits,
+                              std::size_t count, const std::uint32_t* resumed,
+                              std::vector<std::uint32_t>& candidates) {
+    // Two packets: while one waits for memory, the other computes.
+    constexpr int kPackets = 2;
+    Packet packets[kPackets];
+    const std::size_t lanes = hn::Lanes(kFloat);
+    std::size_t next = 0, busy = 0;
+    const auto refill = [&](Packet& p, std::size_t lane) HWY_ATTR {
+        if (next == count) {
+            if (p.is_busy[lane]) --busy;
+            idle_lane(p, lane);
+            return;
+        }
+        const std::uint32_t number = resumed ? resumed[next] : static_cast<std::uint32_t>(next);
+        load_lane(p, lane, rays[number], number);
+        if (resumed) resume_lane(p, lane, hits[number], true);
+        ++next;
+    };
+    for (Packet& p : packets) {
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            p.is_busy[lane] = false;
+            if (next < count) ++busy;
+            refill(p, lane);
+        }
+        fetch(fields, p);
+    }
+    while (busy > 0) {
+        for (Packet& p : packets) {
+            const Ended ended = advance<kMode>(p);
+            const Mask any = hn::Or(hn::Or(ended.hit, ended.candidate), hn::Or(ended.gone, ended.exhausted));
+            if (!hn::AllFalse(kFloat, any)) {
+                const std::uint64_t hit = bits_of(ended.hit), candidate = bits_of(ended.candidate),
+                                    exhausted = bits_of(ended.exhausted);
+                for (std::uint64_t bits = bits_of(any); bits != 0; bits &= bits - 1) {
+                    const auto lane = static_cast<std::size_t>(__builtin_ctzll(bits));
+                    if (!p.is_busy[lane]) continue;
+                    const bool is_hit = hit >> lane & 1, is_candidate = !is_hit && (candidate >> lane & 1);
+                    const MarchStatus status = is_hit                  ? MarchStatus::kHit
+                                               : exhausted >> lane & 1 ? MarchStatus::kExhausted
+                                                                       : MarchStatus::kMiss;
+                    store_lane(p, lane, status, is_hit ? p.hit_s[lane] : p.s[lane], hits[p.ray[lane]]);
+                    if (is_candidate) candidates.push_back(p.ray[lane]);
+                    refill(p, lane);
+                }
+            }
+            fetch(fields, p);
+        }
+    }
+}
+
+/// Searches the cells that rays have come to, all lanes at once. @returns rays without a crossing there
+template <HitMode kMode>
+HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, MarchHit* hits,
+                                std::vector<std::uint32_t>& candidates) {
+    const std::size_t lanes = hn::Lanes(kFloat);
+    std::size_t unresolved = 0;
+    Packet p;
+    for (std::size_t begin = 0; begin < candidates.size(); begin += lanes) {
+        const std::size_t count = candidates.size() - begin < lanes ? candidates.size() - begin : lanes;
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            // What is left over repeats the first.
+            const std::uint32_t number = candidates[begin + (lane < count ? lane : 0)];
+            load_lane(p, lane, rays[number], number);
+            resume_lane(p, lane, hits[number], false);
+        }
+        fetch(fields, p);
+        const std::uint64_t found = bits_of(search_cell<kMode>(p));
+        for (std::size_t lane = 0; lane < count; ++lane) {
+            const std::uint32_t number = p.ray[lane];
+            MarchHit& hit = hits[number];
+            if (!(found >> lane & 1)) {
+                candidates[unresolved++] = number;
+            } else if (p.hit_s[lane] <= rays[number].length) {
+                hit.status = MarchStatus::kHit;
+                hit.distance = p.hit_s[lane];
+            } else {
+                hit.status = MarchStatus::kMiss;
+            }
+        }
+    }
+    candidates.resize(unresolved);
 }
 
 template <HitMode kMode>
 HWY_INLINE HWY_ATTR void march_all(const FieldTable& fields, const MarchRay* rays, MarchHit* hits,
                                    std::size_t count) {
-    // Two packets, so that one computes while the other waits for memory.
-    constexpr int kPackets = 2;
-    Packet packets[kPackets];
-    std::uint64_t ended[kPackets];
-    const std::size_t lanes = hn::Lanes(kFloat);
-    const std::size_t most_ended = lanes / 4 > 0 ? lanes / 4 : 1;
-    std::size_t next = 0;
-    std::size_t busy = 0;
-    for (int k = 0; k < kPackets; ++k) {
-        ended[k] = 0;
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-            if (next < count) {
-                load_lane(packets[k], lane, rays[next], static_cast<std::uint32_t>(next));
-                ++next;
-                ++busy;
-            } else {
-                idle_lane(packets[k], lane);
-            }
-        }
+    std::vector<std::uint32_t> candidates, resumed;
+    candidates.reserve(count);
+    walk<kMode>(fields, rays, hits, count, nullptr, candidates);
+    while (!candidates.empty()) {
+        search<kMode>(fields, rays, hits, candidates);
+        resumed.swap(candidates);
+        candidates.clear();
+        walk<kMode>(fields, rays, hits, resumed.size(), resumed.data(), candidates);
     }
-    while (busy > 0) {
-        for (int k = 0; k < kPackets; ++k) {
-            Packet& p = packets[k];
-            const StepResult result = step<kMode>(fields, p);
-            const Mask any = hn::Or(result.hit, hn::Or(result.gone, result.exhausted));
-            if (hn::AllFalse(kFloat, any)) continue;
-            std::uint64_t hit_bits = 0, gone_bits = 0, exhausted_bits = 0;
-            hn::StoreMaskBits(kFloat, result.hit, reinterpret_cast<std::uint8_t*>(&hit_bits));
-            hn::StoreMaskBits(kFloat, result.gone, reinterpret_cast<std::uint8_t*>(&gone_bits));
-            hn::StoreMaskBits(kFloat, result.exhausted, reinterpret_cast<std::uint8_t*>(&exhausted_bits));
-            for (std::uint64_t bits = hit_bits | gone_bits | exhausted_bits; bits != 0; bits &= bits - 1) {
-                const auto lane = static_cast<std::size_t>(__builtin_ctzll(bits));
-                if (!p.busy[lane]) continue;
-                const bool is_hit = hit_bits >> lane & 1;
-                MarchHit& hit = hits[p.ray[lane]];
-                hit.distance = p.hit_s[lane];
-                hit.brick = p.brick[lane];
-                hit.cell[0] = static_cast<std::int16_t>(p.cx[lane]);
-                hit.cell[1] = static_cast<std::int16_t>(p.cy[lane]);
-                hit.cell[2] = static_cast<std::int16_t>(p.cz[lane]);
-                hit.status =
-                    is_hit ? MarchStatus::kHit
-                           : (exhausted_bits >> lane & 1 ? MarchStatus::kExhausted : MarchStatus::kMiss);
-                hit.enters_negative = p.sign[lane] > 0.0f;
-                hit.steps = static_cast<std::uint32_t>(p.steps[lane]);
-                if (next < count) {
-                    load_lane(p, lane, rays[next], static_cast<std::uint32_t>(next));
-                    ++next;
-                } else {
-                    idle_lane(p, lane);
-                    --busy;
-                }
-            }
-        }
-    }
-    (void)most_ended;
-    (void)ended;
 }
 
 HWY_ATTR void march_rays_eps(const FieldTable& fields, const MarchRay* rays, MarchHit* hits,
