@@ -72,6 +72,21 @@ double surface_offset_voxels(const BrickGrid& grid) {
     return std::min(grid.info().error_voxels.max, 1.0) + kSurfaceClearanceVoxels;
 }
 
+FieldPlacement placement_of(const SdfTracer::PlacedGrid& placed) {
+    FieldPlacement placement;
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int row = 0; row < 3; ++row) {
+            placement.voxel_from_world[3 * axis + row] = placed.voxel_from_world_direction[axis][row];
+        }
+        placement.voxel_origin[axis] = placed.voxel_origin[axis];
+        placement.box[axis] = placed.grid->traced_voxels().maximum[axis];
+    }
+    placement.top_base = placed.place.top_base;
+    placement.top_stride_x = placed.place.stride_x;
+    placement.top_stride_y = placed.place.stride_y;
+    return placement;
+}
+
 }  // namespace
 
 /// A ray in an instance's voxels, and what it has met there so far.
@@ -104,32 +119,39 @@ struct SdfTracer::Nearest {
 /// A ray's way through the box of one instance's field.
 struct SdfTracer::Passage {
     std::uint32_t instance = core::kNoIndex;
-    glm::dvec3 origin{0.0};     ///< Voxel coordinates.
-    glm::dvec3 direction{0.0};  ///< Voxels a world unit.
-    double speed = 1.0;         ///< Its length.
     double t_min = 0.0, t_max = 0.0;
+    double t_per_voxel = 1.0;
+
+    double t_at(const MarchHit& march_hit) const { return t_min + march_hit.distance * t_per_voxel; }
 };
 
 /// A ray on its way through the scene.
 struct SdfTracer::Traced {
-    core::Ray ray;
-    std::uint32_t steps = 0;
-    bool is_exhausted = false;
     Nearest nearest;
     Passage passage;
+    std::uint32_t steps = 0;
+    bool is_exhausted = false;
 };
 
 /// What is counted over the rays of a call, and the memory of its blocks.
 struct SdfTracer::Work {
+    explicit Work(const core::RayStream& stream) : rays(stream) {}
+
+    const core::RayStream& rays;
+    std::size_t first_ray = 0;  ///< Of the block.
     std::uint64_t steps = 0;
     std::uint64_t exhausted = 0;
     std::vector<Traced> traced{kBlockRays};
     std::vector<InstanceTree::Walk> walks{kBlockRays};  ///< Of the same rays.
-    std::vector<std::uint32_t> active;                  ///< Rays that are within a field's box.
-    std::vector<MarchRay> march_rays;                   ///< Of the active rays.
-    std::vector<MarchHit> march_hits;
+    std::vector<std::uint32_t> leaving;                 ///< Rays that go on to their next instance.
+    Entries entries{kBlockRays};
+    std::vector<std::uint32_t> active;             ///< Rays that are within a field's box.
+    std::vector<MarchRay> march_rays{kBlockRays};  ///< Of the active rays.
+    std::vector<MarchHit> march_hits{kBlockRays};
     std::vector<std::uint32_t> met;  ///< Entries of `active` whose crossing is looked up in `surface`.
     SurfacePoints surface;
+
+    core::Ray ray(std::uint32_t slot) const { return rays.get(first_ray + slot); }
 };
 
 SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids,
@@ -150,6 +172,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
     });
     std::vector<core::DoubleBounds> boxes(scene.instances.size());
     placed_.resize(scene.instances.size());
+    placements_.resize(scene.instances.size());
     for (std::size_t i = 0; i < scene.instances.size(); ++i) {
         const core::Instance& instance = scene.instances[i];
         const BrickGrid* grid = grids_[instance.mesh].get();
@@ -165,6 +188,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
             glm::mat3(glm::transpose(placed.voxel_from_world_direction) * grid->voxel_size());
         placed.voxel_origin = (glm::dvec3(instance.local_from_world[3]) - grid->origin()) / h;
         placed.world_from_voxel_scale = largest_singular_value(glm::dmat3(instance.world_from_local)) * h;
+        placements_[i] = placement_of(placed);
         boxes[i] = core::transformed(grid->local_bounds(), instance.world_from_local);
         const double reach = glm::length(glm::max(glm::abs(boxes[i].minimum), glm::abs(boxes[i].maximum)));
         placed.start_offset = static_cast<float>(
@@ -248,56 +272,50 @@ bool SdfTracer::resolve(LocalRay& ray, const Crossing& crossing, Nearest& found)
     return true;
 }
 
-bool SdfTracer::enter_next_instance(Traced& traced, InstanceTree::Walk& walk) const {
-    Passage& passage = traced.passage;
-    while (walk.next(traced.nearest.t, passage.instance)) {
-        const PlacedGrid& placed = placed_[passage.instance];
-        passage.origin =
-            placed.voxel_from_world_direction * glm::dvec3(traced.ray.origin) + placed.voxel_origin;
-        passage.direction = placed.voxel_from_world_direction * glm::dvec3(traced.ray.direction);
-        passage.t_min = traced.ray.t_min;
-        passage.t_max = traced.nearest.t;
-        if (clip_to_box(placed.grid->traced_voxels(), passage.origin, finite_inverse(passage.direction),
-                        passage.t_min, passage.t_max)) {
-            passage.speed = glm::length(passage.direction);
-            return true;
+void SdfTracer::enter_next_instances(Work& work) const {
+    work.active.clear();
+    Entries& entries = work.entries;
+    while (!work.leaving.empty()) {
+        // Those without another instance drop out.
+        std::size_t count = 0;
+        for (const std::uint32_t slot : work.leaving) {
+            std::uint32_t instance = 0;
+            const double limit = work.traced[slot].nearest.t;
+            if (!work.walks[slot].next(limit, instance)) continue;
+            entries.ray[count] = static_cast<std::int32_t>(work.first_ray + slot);
+            entries.instance[count] = static_cast<std::int32_t>(instance);
+            entries.limit[count] = limit;
+            work.leaving[count++] = slot;
         }
+        if (count > 0) {
+            enter_fields(work.rays, placements_.data(), entries, count,
+                         work.march_rays.data() + work.active.size());
+        }
+        std::size_t missing = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::uint32_t slot = work.leaving[i];
+            if (entries.t_min[i] <= entries.t_max[i]) {
+                work.traced[slot].passage = {static_cast<std::uint32_t>(entries.instance[i]),
+                                             entries.t_min[i], entries.t_max[i], entries.t_per_voxel[i]};
+                work.active.push_back(slot);
+            } else {
+                work.leaving[missing++] = slot;
+            }
+        }
+        work.leaving.resize(missing);
     }
-    return false;
 }
 
-MarchRay SdfTracer::march_ray(const Passage& passage) const {
-    // A hit close to the end is the kernel's to find and finish_passage()'s to judge, in double.
-    constexpr double kBeyond = 1e-3;
-    constexpr double kParallel = 1e-20;
-    const FieldAtlas::Place& place = placed_[passage.instance].place;
-    // From here on single precision suffices: it is that of the field's own box.
-    const glm::dvec3 start = passage.origin + passage.t_min * passage.direction;
-    const double inverse_speed = 1.0 / passage.speed;
-    MarchRay ray;
-    for (int axis = 0; axis < 3; ++axis) {
-        const double direction = passage.direction[axis] * inverse_speed;
-        ray.origin[axis] = glm::clamp(static_cast<float>(start[axis]), 0.0f, place.cell_count[axis]);
-        ray.direction[axis] = std::abs(direction) < kParallel ? 0.0f : static_cast<float>(direction);
-        ray.cell_count[axis] = place.cell_count[axis];
-    }
-    ray.length = static_cast<float>((passage.t_max - passage.t_min) * passage.speed + kBeyond);
-    ray.top_base = place.top_base;
-    ray.top_stride_x = place.stride_x;
-    ray.top_stride_y = place.stride_y;
-    return ray;
-}
-
-SdfTracer::LocalRay SdfTracer::local_ray(const Traced& traced) const {
-    const Passage& passage = traced.passage;
-    return {traced.ray,
-            passage.instance,
-            placed_[passage.instance],
-            scene_.meshes[scene_.instances[passage.instance].mesh],
-            passage.origin,
-            passage.direction,
+SdfTracer::LocalRay SdfTracer::local_ray(const core::Ray& ray, const Traced& traced) const {
+    const PlacedGrid& placed = placed_[traced.passage.instance];
+    return {ray,
+            traced.passage.instance,
+            placed,
+            scene_.meshes[scene_.instances[traced.passage.instance].mesh],
+            placed.voxel_from_world_direction * glm::dvec3(ray.origin) + placed.voxel_origin,
+            placed.voxel_from_world_direction * glm::dvec3(ray.direction),
             traced.nearest.t,
-            traced.ray.t_min,
+            ray.t_min,
             false};
 }
 
@@ -309,21 +327,20 @@ void SdfTracer::keep_nearer(const Nearest& found, Traced& traced) const {
     }
 }
 
-void SdfTracer::finish_thickened(const MarchHit& march_hit, Traced& traced) const {
+void SdfTracer::finish_thickened(const core::Ray& ray, const MarchHit& march_hit, Traced& traced) const {
     const Passage& passage = traced.passage;
-    const PlacedGrid& placed = placed_[passage.instance];
-    LocalRay local = local_ray(traced);
+    LocalRay local = local_ray(ray, traced);
     local.is_inside =
-        distance_at(*placed.grid, passage.origin + passage.t_min * passage.direction).value_or(1.0) < 0.0;
+        distance_at(*local.placed.grid, local.origin + passage.t_min * local.direction).value_or(1.0) < 0.0;
     Nearest found;
     if (march_hit.status == MarchStatus::kHit) {
         Crossing crossing;
-        crossing.t = passage.t_min + march_hit.distance / passage.speed;
+        crossing.t = passage.t_at(march_hit);
         if (crossing.t <= passage.t_max) {
             crossing.cell = {march_hit.cell[0], march_hit.cell[1], march_hit.cell[2]};
-            crossing.point = glm::clamp(
-                passage.origin + crossing.t * passage.direction - glm::dvec3(crossing.cell), 0.0, 1.0);
-            crossing.brick = march_hit.brick - placed.place.brick_base;
+            crossing.point =
+                glm::clamp(local.origin + crossing.t * local.direction - glm::dvec3(crossing.cell), 0.0, 1.0);
+            crossing.brick = march_hit.brick - local.placed.place.brick_base;
             crossing.enters_negative = march_hit.enters_negative;
             // What lies behind a crossing that is no visible surface is walked to one by one.
             if (!resolve(local, crossing, found)) walk_crossings(local, traced, found);
@@ -334,51 +351,39 @@ void SdfTracer::finish_thickened(const MarchHit& march_hit, Traced& traced) cons
     keep_nearer(found, traced);
 }
 
-void SdfTracer::add_surface_point(const MarchHit& march_hit, const Passage& passage, std::size_t to,
-                                  SurfacePoints& surface) const {
-    const double t = passage.t_min + march_hit.distance / passage.speed;
-    const glm::dvec3 point = passage.origin + t * passage.direction;
-    surface.x[to] = static_cast<float>(point.x);
-    surface.y[to] = static_cast<float>(point.y);
-    surface.z[to] = static_cast<float>(point.z);
-    const int x = march_hit.cell[0], y = march_hit.cell[1], z = march_hit.cell[2];
-    surface.cell_x[to] = static_cast<float>(x);
-    surface.cell_y[to] = static_cast<float>(y);
-    surface.cell_z[to] = static_cast<float>(z);
-    surface.brick[to] = march_hit.brick;
-    surface.first_sample[to] = Brick::index(x % kBrickCells, y % kBrickCells, z % kBrickCells);
-}
-
-void SdfTracer::finish_plain(const MarchHit& march_hit, const SurfacePoints& surface, std::size_t at,
-                             Traced& traced) const {
+void SdfTracer::finish_plain(const Work& work, std::size_t at, Traced& traced) const {
+    const std::uint32_t entry = work.met[at];
+    const MarchHit& march_hit = work.march_hits[entry];
     const Passage& passage = traced.passage;
     const PlacedGrid& placed = placed_[passage.instance];
+    const SurfacePoints& surface = work.surface;
     Nearest found;
-    found.t = passage.t_min + march_hit.distance / passage.speed;
-    const std::int32_t number = surface.triangle[at] - placed.place.triangle_base;
+    found.t = passage.t_at(march_hit);
+    found.triangle = static_cast<std::uint32_t>(surface.triangle[at] - placed.place.triangle_base);
+    found.barycentrics = {surface.u[at], surface.v[at]};
     const bool is_surface = surface.triangle[at] >= 0 &&
                             surface.distance_squared[at] <= kFarthestTriangleVoxels * kFarthestTriangleVoxels;
-    found.triangle = static_cast<std::uint32_t>(number);
-    found.barycentrics = {surface.u[at], surface.v[at]};
-    if (is_surface && (!has_alpha_ || core::is_visible(scene_, passage.instance, found.triangle,
-                                                       found.barycentrics, traced.ray.seed))) {
+    if (is_surface &&
+        (!has_alpha_ || core::is_visible(scene_, passage.instance, found.triangle, found.barycentrics,
+                                         work.ray(work.active[entry]).seed))) {
         found.instance = passage.instance;
         found.gradient = {surface.gradient_x[at], surface.gradient_y[at], surface.gradient_z[at]};
         found.enters_negative = march_hit.enters_negative;
-        const VoxelTriangle& triangle = atlas_.triangle(surface.triangle[at]);
-        const glm::vec3 scaled_normal = glm::cross(glm::vec3(triangle.ab[0], triangle.ab[1], triangle.ab[2]),
-                                                   glm::vec3(triangle.ac[0], triangle.ac[1], triangle.ac[2]));
-        found.is_front = glm::dot(glm::vec3(passage.direction), scaled_normal) < 0.0f;
+        const float* direction = work.march_rays[entry].direction;
+        found.is_front = glm::dot(glm::vec3(direction[0], direction[1], direction[2]),
+                                  atlas_.triangle(surface.triangle[at]).scaled_normal()) < 0.0f;
     } else {
-        LocalRay local = local_ray(traced);
-        walk_crossings(local, traced, found = Nearest());
+        const core::Ray ray = work.ray(work.active[entry]);
+        LocalRay local = local_ray(ray, traced);
+        found = Nearest();
+        walk_crossings(local, traced, found);
     }
     keep_nearer(found, traced);
 }
 
 void SdfTracer::walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const {
     const Passage& passage = traced.passage;
-    RayMarch march(*local.placed.grid, passage.origin, passage.direction, passage.t_min, passage.t_max);
+    RayMarch march(*local.placed.grid, local.origin, local.direction, passage.t_min, passage.t_max);
     Crossing crossing;
     while (!found.found() && march.next(crossing)) resolve(local, crossing, found);
     traced.steps += march.steps();
@@ -413,10 +418,9 @@ glm::vec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) co
     return normal;
 }
 
-core::Hit SdfTracer::finish(const Traced& traced) const {
+core::Hit SdfTracer::finish(const core::Ray& ray, const Traced& traced) const {
     core::Hit hit;
     hit.steps = traced.steps;
-    const core::Ray& ray = traced.ray;
     const Nearest& nearest = traced.nearest;
     if (!nearest.found()) {
         if (traced.is_exhausted) hit.status = core::HitStatus::kExhausted;
@@ -439,70 +443,65 @@ core::Hit SdfTracer::finish(const Traced& traced) const {
 
 void SdfTracer::march_active(bool any, Work& work) const {
     const std::size_t count = work.active.size();
-    work.march_rays.resize(count);
-    work.march_hits.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        work.march_rays[i] = march_ray(work.traced[work.active[i]].passage);
-    }
-    march_rays(atlas_.table(), hit_mode_, work.march_rays, work.march_hits);
+    march_rays(atlas_.table(), hit_mode_, std::span(work.march_rays).first(count),
+               std::span(work.march_hits).first(count));
 
     work.met.clear();
     for (std::size_t i = 0; i < count; ++i) {
         Traced& traced = work.traced[work.active[i]];
         const MarchHit& march_hit = work.march_hits[i];
-        const Passage& passage = traced.passage;
-        const PlacedGrid& placed = placed_[passage.instance];
+        const PlacedGrid& placed = placed_[traced.passage.instance];
         traced.steps += march_hit.steps;
         if (placed.triangles) {
-            finish_thickened(march_hit, traced);
+            finish_thickened(work.ray(work.active[i]), march_hit, traced);
         } else if (march_hit.status == MarchStatus::kExhausted) {
             traced.is_exhausted = true;
         } else if (march_hit.status == MarchStatus::kHit) {
-            const double t = passage.t_min + march_hit.distance / passage.speed;
-            if (!(t <= passage.t_max)) continue;
+            const double t = traced.passage.t_at(march_hit);
+            if (!(t <= traced.passage.t_max)) continue;
             if (any && placed.is_opaque_solid) {
                 traced.nearest.t = t;
-                traced.nearest.instance = passage.instance;
+                traced.nearest.instance = traced.passage.instance;
             } else {
                 work.met.push_back(static_cast<std::uint32_t>(i));
             }
         }
     }
+    if (work.met.empty()) return;
     work.surface.resize(work.met.size());
     for (std::size_t i = 0; i < work.met.size(); ++i) {
-        add_surface_point(work.march_hits[work.met[i]], work.traced[work.active[work.met[i]]].passage, i,
-                          work.surface);
+        work.surface.set(i, work.march_rays[work.met[i]], work.march_hits[work.met[i]]);
     }
     find_surface(atlas_.surface_table(), work.surface);
     for (std::size_t i = 0; i < work.met.size(); ++i) {
-        finish_plain(work.march_hits[work.met[i]], work.surface, i, work.traced[work.active[work.met[i]]]);
+        finish_plain(work, i, work.traced[work.active[work.met[i]]]);
     }
 }
 
-void SdfTracer::trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any,
-                            Work& work) const {
-    work.active.clear();
+void SdfTracer::trace_block(std::size_t begin, std::size_t end, bool any, Work& work) const {
+    const core::RayStream& rays = work.rays;
+    work.first_ray = begin;
+    work.leaving.clear();
     for (std::size_t i = begin; i < end; ++i) {
         const std::size_t slot = i - begin;
         Traced& traced = work.traced[slot];
-        traced.ray = rays.get(i);
         traced.steps = 0;
         traced.is_exhausted = false;
-        traced.nearest.t = traced.ray.t_max;
         traced.nearest.instance = core::kNoIndex;
-        if (!core::is_valid_ray(traced.ray)) continue;
-        work.walks[slot].start(tree_, glm::dvec3(traced.ray.origin), glm::dvec3(traced.ray.direction),
-                               traced.ray.t_min, traced.nearest.t);
-        if (enter_next_instance(traced, work.walks[slot])) {
-            work.active.push_back(static_cast<std::uint32_t>(slot));
-        }
+        const core::Ray ray = rays.get(i);
+        if (!core::is_valid_ray(ray)) continue;
+        traced.nearest.t = ray.t_max;
+        work.walks[slot].start(tree_, glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min,
+                               ray.t_max);
+        work.leaving.push_back(static_cast<std::uint32_t>(slot));
     }
-    while (!work.active.empty()) {
+    for (;;) {
+        enter_next_instances(work);
+        if (work.active.empty()) break;
         march_active(any, work);
-        std::erase_if(work.active, [&](std::uint32_t slot) {
-            Traced& traced = work.traced[slot];
-            return (any && traced.nearest.found()) || !enter_next_instance(traced, work.walks[slot]);
-        });
+        for (const std::uint32_t slot : work.active) {
+            if (!any || !work.traced[slot].nearest.found()) work.leaving.push_back(slot);
+        }
     }
     for (std::size_t slot = 0; slot < end - begin; ++slot) {
         work.steps += work.traced[slot].steps;
@@ -512,10 +511,10 @@ void SdfTracer::trace_block(const core::RayStream& rays, std::size_t begin, std:
 
 template <typename Finished>
 void SdfTracer::trace(const core::RayStream& rays, bool any, const Finished& finished) const {
-    Work work;
+    Work work(rays);
     for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
         const std::size_t end = std::min(begin + kBlockRays, rays.size());
-        trace_block(rays, begin, end, any, work);
+        trace_block(begin, end, any, work);
         for (std::size_t i = begin; i < end; ++i) finished(i, work.traced[i - begin]);
     }
     ray_count_.fetch_add(rays.size(), std::memory_order_relaxed);
@@ -525,7 +524,8 @@ void SdfTracer::trace(const core::RayStream& rays, bool any, const Finished& fin
 
 void SdfTracer::trace_closest(const core::RayStream& rays, core::HitStream& hits) const {
     hits.resize(rays.size());
-    trace(rays, false, [&](std::size_t i, const Traced& traced) { hits.set(i, finish(traced)); });
+    trace(rays, false,
+          [&](std::size_t i, const Traced& traced) { hits.set(i, finish(rays.get(i), traced)); });
 }
 
 void SdfTracer::trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const {

@@ -15,6 +15,7 @@
 #include "core/trace/tracer.h"
 #include "sdf/brick_grid.h"
 #include "sdf/cell_triangles.h"
+#include "sdf/entry_kernel.h"
 #include "sdf/field_table.h"
 #include "sdf/instance_tree.h"
 #include "sdf/sphere_trace.h"
@@ -54,7 +55,6 @@ public:
     /// Memory held by grids and instances.
     std::size_t bytes() const;
 
-private:
     /// One instance, ready for rays.
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
@@ -67,6 +67,8 @@ private:
         float start_offset = 0.0f;
         bool is_opaque_solid = false;  ///< Every crossing is a visible surface.
     };
+
+private:
     struct LocalRay;
     struct Nearest;
     struct Passage;
@@ -77,24 +79,18 @@ private:
     template <typename Finished>
     void trace(const core::RayStream& rays, bool any, const Finished& finished) const;
     /// Traces rays begin to end - 1 together.
-    void trace_block(const core::RayStream& rays, std::size_t begin, std::size_t end, bool any,
-                     Work& work) const;
-    /// Brings a ray to the next instance whose field it may meet; false once there is none.
-    bool enter_next_instance(Traced& traced, InstanceTree::Walk& walk) const;
+    void trace_block(std::size_t begin, std::size_t end, bool any, Work& work) const;
+    /// Brings every leaving ray to the next instance whose field it may meet, if there is one.
+    void enter_next_instances(Work& work) const;
     /// Takes all active rays through the field that each has come to.
     void march_active(bool any, Work& work) const;
-    /// A passage as the kernel takes it.
-    MarchRay march_ray(const Passage& passage) const;
-    void add_surface_point(const MarchHit& march_hit, const Passage& passage, std::size_t to,
-                           SurfacePoints& surface) const;
-    /// Takes what the kernels found in a field without thickened features.
-    void finish_plain(const MarchHit& march_hit, const SurfacePoints& surface, std::size_t at,
-                      Traced& traced) const;
+    /// Takes what the kernels found, as number `at` of `met`, in a field without thickened features.
+    void finish_plain(const Work& work, std::size_t at, Traced& traced) const;
     /// The same for fields with such features, whose triangles decide.
-    void finish_thickened(const MarchHit& march_hit, Traced& traced) const;
+    void finish_thickened(const core::Ray& ray, const MarchHit& march_hit, Traced& traced) const;
     /// Looks for the first visible surface without a kernel, from crossing to crossing.
     void walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const;
-    LocalRay local_ray(const Traced& traced) const;
+    LocalRay local_ray(const core::Ray& ray, const Traced& traced) const;
     void keep_nearer(const Nearest& found, Traced& traced) const;
     /// Finds the triangle of a crossing; false where there is no visible surface.
     bool resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const;
@@ -103,7 +99,7 @@ private:
     /// The normal that faces the ray: of the triangle itself, or of the field.
     glm::vec3 triangle_side(const core::Ray& ray, const Nearest& nearest) const;
     glm::vec3 field_side(const core::Ray& ray, const Nearest& nearest) const;
-    core::Hit finish(const Traced& traced) const;
+    core::Hit finish(const core::Ray& ray, const Traced& traced) const;
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;
@@ -111,6 +107,7 @@ private:
     FieldAtlas atlas_;
     HitMode hit_mode_;
     std::vector<PlacedGrid> placed_;
+    std::vector<FieldPlacement> placements_;  ///< Of the same instances, for the kernel.
     InstanceTree tree_;
     bool has_alpha_ = false;
     mutable std::atomic<std::uint64_t> ray_count_{0};

@@ -170,14 +170,28 @@ std::int32_t stored_gradient(const glm::dvec3& gradient) {
                                      component(gradient.z) << 2);
 }
 
+void SurfacePoints::set(std::size_t index, const MarchRay& ray, const MarchHit& hit) {
+    x[index] = ray.origin[0] + hit.distance * ray.direction[0];
+    y[index] = ray.origin[1] + hit.distance * ray.direction[1];
+    z[index] = ray.origin[2] + hit.distance * ray.direction[2];
+    cell_x[index] = hit.cell[0];
+    cell_y[index] = hit.cell[1];
+    cell_z[index] = hit.cell[2];
+    brick[index] = hit.brick;
+    first_sample[index] =
+        Brick::index(hit.cell[0] % kBrickCells, hit.cell[1] % kBrickCells, hit.cell[2] % kBrickCells);
+}
+
 void SurfacePoints::resize(std::size_t count) {
     size_ = count;
     const std::size_t padded = core::padded_stream_size(count);
     for (auto* column : {&x, &y, &z, &cell_x, &cell_y, &cell_z, &gradient_x, &gradient_y, &gradient_z, &u, &v,
                          &distance_squared}) {
-        column->resize(padded);
+        if (column->size() < padded) column->resize(padded);
     }
-    for (auto* column : {&brick, &first_sample, &triangle}) column->resize(padded);
+    for (auto* column : {&brick, &first_sample, &triangle}) {
+        if (column->size() < padded) column->resize(padded);
+    }
     for (std::size_t i = count; i < padded; ++i) {
         x[i] = y[i] = z[i] = cell_x[i] = cell_y[i] = cell_z[i] = 0.0f;
         brick[i] = first_sample[i] = 0;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/trace/ray_stream.h"
+#include "sdf/field_kernel.h"
 
 namespace sdf {
 
@@ -15,6 +16,10 @@ namespace sdf {
 struct VoxelTriangle {
     float a[3];          ///< First corner.
     float ab[3], ac[3];  ///< To the second and the third.
+
+    glm::vec3 scaled_normal() const {
+        return glm::cross(glm::vec3(ab[0], ab[1], ab[2]), glm::vec3(ac[0], ac[1], ac[2]));
+    }
 };
 
 /// A gradient of the field in one word: three components of 10 bits, in steps of kGradientStep.
@@ -30,7 +35,7 @@ struct SurfaceTable {
     const VoxelTriangle* triangles = nullptr;
 };
 
-/// Crossings and what was found there, one column a component, padded to whole vectors.
+/// Crossings and what was found there, one column a component, at least as long as whole vectors need.
 struct SurfacePoints {
     // In.
     core::Column<float> x, y, z;                 ///< Voxel coordinates.
@@ -47,6 +52,8 @@ struct SurfacePoints {
     std::size_t size() const { return size_; }
     /// Padding is filled with crossings of the first brick.
     void resize(std::size_t count);
+    /// Sets a crossing that march_rays() found.
+    void set(std::size_t index, const MarchRay& ray, const MarchHit& hit);
 
 private:
     std::size_t size_ = 0;
