@@ -75,32 +75,66 @@ core::Mesh capped_tube(const char* name, int ring_count, int side_count, const g
     return finished(name, std::move(positions), std::move(triangles));
 }
 
-/// A fluted column on a base and under a capital, from y = 0 to `height`.
-core::Mesh column_mesh(double radius, double height) {
+/// How far columns and boxes reach into the floor, and arches into what they stand on. Faces that are buried
+/// must lie deeper than two voxels, and meet what buries them at right angles, or the bake takes what lies
+/// before them for a thin wall.
+constexpr double kBuried = 0.4;
+
+/// A fluted shaft between a round base and a round capital, from y = -kBuried to `height`.
+core::Mesh column_mesh(double height) {
     constexpr int kRings = 24, kSides = 48, kFlutes = 12;
+    constexpr double kShaft = 0.4, kEnd = 0.9, kEndHeight = 0.7;
     const auto ring = [&](int i, int j) {
-        const double y = double(i) / (kRings - 1);
+        const double y = -kBuried + (height + kBuried) * i / (kRings - 1);
+        const double from_end = std::min(y, height - y);
+        const double shaft = std::clamp((from_end - kEndHeight) / 0.4, 0.0, 1.0);
         const double angle = 2.0 * kPi * j / kSides;
-        // Thicker towards both ends, fluted between them.
-        const double end = std::pow(std::abs(2.0 * y - 1.0), 6.0);
-        const double flute = (1.0 - end) * 0.1 * std::cos(kFlutes * angle);
-        const double r = radius * (1.0 + 0.5 * end + flute);
-        return glm::dvec3(r * std::cos(angle), y * height, r * std::sin(angle));
+        const double fluted = kShaft * (1.0 + 0.08 * std::cos(kFlutes * angle));
+        const double r = kEnd + shaft * shaft * (3.0 - 2.0 * shaft) * (fluted - kEnd);
+        return glm::dvec3(r * std::cos(angle), y, r * std::sin(angle));
     };
-    return capped_tube("column", kRings, kSides, glm::dvec3(0.0), glm::dvec3(0.0, height, 0.0), ring);
+    return capped_tube("column", kRings, kSides, glm::dvec3(0.0, -kBuried, 0.0), glm::dvec3(0.0, height, 0.0),
+                       ring);
 }
 
-/// Half a torus over the x axis: from (-radius, 0, 0) up to (0, radius, 0) and down again.
+/// Half a torus on straight legs, over the x axis: it stands at y = 0 and reaches kBuried below.
 core::Mesh arch_mesh(double radius, double thickness) {
-    constexpr int kRings = 25, kSides = 12;
+    constexpr int kRings = 27, kSides = 12;
+    constexpr double kLeg = 0.4;
     const auto ring = [&](int i, int j) {
-        const double along = kPi * (1.0 - double(i) / (kRings - 1)), round = -2.0 * kPi * j / kSides;
+        const double along = kPi * (1.0 - double(std::clamp(i, 1, kRings - 2) - 1) / (kRings - 3));
+        const double rise = i == 0 || i == kRings - 1 ? -kBuried : kLeg, round = -2.0 * kPi * j / kSides;
         const glm::dvec3 outwards(std::cos(along), std::sin(along), 0.0);
         return outwards * (radius + thickness * std::cos(round)) +
-               glm::dvec3(0.0, 0.0, thickness * std::sin(round));
+               glm::dvec3(0.0, rise, thickness * std::sin(round));
     };
-    return capped_tube("arch", kRings, kSides, glm::dvec3(-radius, 0.0, 0.0), glm::dvec3(radius, 0.0, 0.0),
-                       ring);
+    return capped_tube("arch", kRings, kSides, glm::dvec3(-radius, -kBuried, 0.0),
+                       glm::dvec3(radius, -kBuried, 0.0), ring);
+}
+
+/// A box without a lid, as thick as `wall`: the inside reaches from y = 0 to the rim at half_extent.y.
+core::Mesh open_box_mesh(const glm::dvec3& half_extent, double wall) {
+    const glm::dvec3 inner = half_extent - wall;
+    std::vector<glm::vec3> positions;
+    // Counter-clockwise seen from above: outside at the bottom and at the rim, inside at the rim and below.
+    const auto add_ring = [&](double x, double y, double z) {
+        for (const glm::dvec2 sign :
+             {glm::dvec2(-1, -1), glm::dvec2(-1, 1), glm::dvec2(1, 1), glm::dvec2(1, -1)})
+            positions.emplace_back(sign.x * x, y, sign.y * z);
+    };
+    add_ring(half_extent.x, -wall, half_extent.z);
+    add_ring(half_extent.x, half_extent.y, half_extent.z);
+    add_ring(inner.x, half_extent.y, inner.z);
+    add_ring(inner.x, 0.0, inner.z);
+    std::vector<glm::uvec3> triangles = {{0, 2, 1}, {0, 3, 2}, {12, 13, 14}, {12, 14, 15}};
+    for (unsigned ring = 0; ring < 12; ring += 4) {
+        for (unsigned j = 0; j < 4; ++j) {
+            const unsigned a = ring + j, b = ring + (j + 1) % 4;
+            triangles.emplace_back(a, b, b + 4);
+            triangles.emplace_back(a, b + 4, a + 4);
+        }
+    }
+    return finished("open box", std::move(positions), std::move(triangles));
 }
 
 glm::dmat4 random_turn(TestRandom& random) {
@@ -158,44 +192,36 @@ core::Mesh blob_mesh(int level) {
 
 core::Mesh hall_mesh() {
     MeshList list;
-    const auto slab = [&](const glm::dvec3& low, const glm::dvec3& high) {
-        list.add(box(), translation(0.5 * (low + high)) * scaling(high - low));
-    };
-    // Walls reach into the floor and into each other, so that nothing coincides.
-    constexpr double kX = 10.0, kY = 8.0, kZ = 6.0, kWall = 0.6;
-    slab({-kX, -kWall, -kZ}, {kX, 0.0, kZ});
-    for (const double side : {-1.0, 1.0}) {
-        const double x = side * (kX - 0.5 * kWall), z = side * (kZ - 0.5 * kWall);
-        slab({x - 0.49 * kWall, -0.5 * kWall, -kZ + 0.01}, {x + 0.49 * kWall, kY, kZ - 0.01});
-        slab({-kX + 0.02, -0.4 * kWall, z - 0.48 * kWall}, {kX - 0.02, kY - 0.1, z + 0.48 * kWall});
-    }
+    list.add(open_box_mesh({10.0, 8.0, 6.0}, 2.0 * kBuried), glm::dmat4(1.0));
 
     constexpr int kColumns = 9;
-    constexpr double kSpacing = 2.1, kColumnHeight = 5.0;
-    const core::Mesh column = column_mesh(0.4, kColumnHeight), arch = arch_mesh(0.5 * kSpacing, 0.32);
+    constexpr double kSpacing = 2.0, kColumnHeight = 5.0;
+    // Legs of neighbouring arches stand side by side on the column between them.
+    const core::Mesh column = column_mesh(kColumnHeight), arch = arch_mesh(0.5 * kSpacing - 0.34, 0.24);
     for (const double z : {-2.6, 2.6}) {
         for (int i = 0; i < kColumns; ++i) {
             const double x = kSpacing * (i - 0.5 * (kColumns - 1));
-            list.add(column, translation({x, -0.1, z}));
-            if (i + 1 < kColumns) {
-                list.add(arch, translation({x + 0.5 * kSpacing, kColumnHeight - 0.35, z}));
-            }
+            list.add(column, translation({x, 0.0, z}));
+            if (i + 1 < kColumns) list.add(arch, translation({x + 0.5 * kSpacing, kColumnHeight, z}));
         }
     }
 
+    // Boxes stand in rows, each turned and sized at random, and touch nothing but the floor.
     TestRandom random(11);
-    const core::Mesh ball = icosphere(3);
-    for (int i = 0; i < 60; ++i) {
-        const double size = random.uniform(0.5, 1.3);
-        const double x = random.uniform(-9.0, 9.0), z = random.uniform(-5.0, 5.0);
-        const double w = random.uniform(0.7, 1.3), h = random.uniform(0.7, 1.8), d = random.uniform(0.7, 1.3);
-        const glm::dmat4 turn = rotation(2.0 * kPi * random.uniform(), glm::dvec3(0.0, 1.0, 0.0));
-        const double tilt = random.uniform(-0.2, 0.2);
-        list.add(box(), translation({x, 0.35 * size, z}) * turn * rotation(tilt, glm::dvec3(1.0, 0.0, 0.0)) *
-                            scaling(size * glm::dvec3(w, h, d)));
+    constexpr int kBoxesInRow = 15;
+    for (const double z : {-4.3, -0.75, 0.75, 4.3}) {
+        for (int i = 0; i < kBoxesInRow; ++i) {
+            const double x = 1.22 * (i - 0.5 * (kBoxesInRow - 1));
+            const double width = random.uniform(0.4, 0.75), depth = random.uniform(0.4, 0.75);
+            const double height = random.uniform(0.4, 2.0), turn = kPi * random.uniform();
+            list.add(box(), translation({x, 0.5 * (height - kBuried), z}) *
+                                rotation(turn, glm::dvec3(0.0, 1.0, 0.0)) *
+                                scaling({width, height + kBuried, depth}));
+        }
     }
+    const core::Mesh ball = icosphere(3);
     for (int i = 0; i < 3; ++i) {
-        list.add(ball, translation({-6.0 + 6.0 * i, 2.0, 0.3 * i}) * scaling(glm::dvec3(0.8)));
+        list.add(ball, translation({-6.0 + 6.0 * i, 3.6, 0.3 * i}) * scaling(glm::dvec3(0.8)));
     }
     return make_mesh("hall", std::move(list.positions), std::move(list.normals), {},
                      std::move(list.triangles));

@@ -44,7 +44,7 @@ std::string suffix_of(const std::string& target) {
 sdf::SampledField bake(const core::Scene& scene, int resolution, const std::filesystem::path& cache) {
     sdf::BakeSettings settings;
     settings.resolution = resolution;
-    const sdf::BakeResult result = sdf::bake_scene(scene, settings, cache);
+    const sdf::BakeResult result = sdf::bake_scene(scene, settings, cache / fmt::format("{}", resolution));
     const sdf::MeshBake& bake = result.meshes.at(0);
     if (bake.error) throw *bake.error;
     sdf::SampledField field = sdf::read_field(bake.file);
@@ -72,11 +72,13 @@ sdf::TriangleBvh tree_of(const core::Mesh& mesh) {
 
 std::vector<std::string> bench_tracer_names() {
     std::vector<std::string> names;
-    const std::vector<std::string> targets = sdf::kernel_targets();
+    // The best one is what the plain name stands for; older ones than SSE4 no build needs.
+    std::vector<std::string> targets = sdf::kernel_targets();
+    targets.erase(targets.begin());
+    std::erase_if(targets, [](const std::string& target) { return target == "SSSE3" || target == "SSE2"; });
     for (const NamedMode& mode : kModes) {
         names.emplace_back(mode.name);
-        // The first is the best, which the plain name stands for.
-        for (std::size_t i = 1; i < targets.size(); ++i) names.push_back(mode.name + suffix_of(targets[i]));
+        for (const std::string& target : targets) names.push_back(mode.name + suffix_of(target));
     }
     names.emplace_back("sdf_scalar");
     for (const NamedCall& call : kCalls) {
