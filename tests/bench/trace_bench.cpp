@@ -184,8 +184,11 @@ std::vector<Row> all_rows() {
 Options parse(int count, char** arguments) {
     Options options;
     for (int i = 1; i < count; ++i) {
-        const std::string_view argument = arguments[i];
+        const std::string_view whole = arguments[i];
+        const std::size_t equals = whole.find('=');
+        const std::string_view argument = whole.substr(0, equals);
         const auto next = [&]() -> std::string_view {
+            if (equals != std::string_view::npos) return whole.substr(equals + 1);
             if (++i >= count) usage(fmt::format("'{}' wants a value", argument));
             return arguments[i];
         };
