@@ -25,6 +25,10 @@ RAYS = ("primary", "bounce", "occlusion")
 MESHES = (("hall", 128), ("hall", 256), ("blob", 128), ("blob", 256))
 CROWDS = (1, 10, 100, 1000)
 
+# The rows that the floors on speed are about.
+FLOOR_ROWS = ("/((hall|blob)/bounce/128(/threads:[12])?|hall/(primary|bounce)/256|hall/(primary|occlusion)/128|blob/primary/256"
+              "|crowd.*/bounce/64)$")
+
 # Largest values that --short lets pass: the hit mode's margin where it has one, else about twice what was measured.
 BOUNDS = {
     "sdf_cubic": {"error_p99_voxels": 1e-3, "reference_disagreement": 1e-3, "mesh_error_mean_voxels": 0.1},
@@ -236,6 +240,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=0.2, help="least time a row and round")
     parser.add_argument("--filter", help="regular expression on the rows' names")
+    parser.add_argument("--floors", action="store_true", help="only the rows that the floors on speed are about")
     parser.add_argument("--save", help="keep the report of the program here")
     parser.add_argument("--from", dest="source", help="a report kept earlier")
     parser.add_argument("--short", action="store_true")
@@ -244,6 +249,8 @@ def main():
         options.program = str(pathlib.Path(options.fieldlight).parent / "tests" / "fieldlight_bench")
     if not options.fields:
         options.fields = str(pathlib.Path(options.program).parent.parent / "bench_fields")
+    if options.floors:
+        options.filter = FLOOR_ROWS
     if options.short:
         options.side, options.rounds, options.seconds = 64, 1, 1e-6
 
