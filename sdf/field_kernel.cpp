@@ -65,12 +65,10 @@ struct Corners {
     Floats v000, v001, v010, v011, v100, v101, v110, v111;
 
     HWY_ATTR Floats at(Floats x, Floats y, Floats z) const {
-        const Floats one = hn::Set(kFloat, 1.0f);
-        const Floats rx = one - x, ry = one - y, rz = one - z;
-        const Floats c00 = rx * v000 + x * v100, c01 = rx * v001 + x * v101;
-        const Floats c10 = rx * v010 + x * v110, c11 = rx * v011 + x * v111;
-        const Floats c0 = ry * c00 + y * c10, c1 = ry * c01 + y * c11;
-        return rz * c0 + z * c1;
+        const Floats c00 = v000 + x * (v100 - v000), c01 = v001 + x * (v101 - v001);
+        const Floats c10 = v010 + x * (v110 - v010), c11 = v011 + x * (v111 - v011);
+        const Floats c0 = c00 + y * (c10 - c00), c1 = c01 + y * (c11 - c01);
+        return c0 + z * (c1 - c0);
     }
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/math/bounds.h"
+#include "core/math/ray.h"
 
 namespace sdf {
 
@@ -47,6 +48,9 @@ public:
         int depth_ = 0;
         Entry stack_[kMaxDepth];
     };
+
+    /// The instance, if exactly one can be met; kNoIndex else.
+    std::uint32_t only_instance() const { return order_.size() == 1 ? order_[0] : core::kNoIndex; }
 
     std::size_t bytes() const { return nodes_.size() * sizeof(Node) + order_.size() * sizeof(order_[0]); }
 

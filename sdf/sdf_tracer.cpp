@@ -36,7 +36,7 @@ constexpr double kShellVoxels = 0.25;
 constexpr double kShellPassageVoxels = 8.0;
 
 /// Rays that are traced together: enough to keep the lanes of a kernel busy, few enough for the cache.
-constexpr std::size_t kBlockRays = 512;
+constexpr std::size_t kBlockRays = 2048;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -133,14 +133,11 @@ struct SdfTracer::Traced {
     bool is_exhausted = false;
 };
 
-/// What is counted over the rays of a call, and the memory of its blocks.
+/// The memory of a block of rays.
 struct SdfTracer::Work {
-    explicit Work(const core::RayStream& stream) : rays(stream) {}
-
-    const core::RayStream& rays;
+    const core::RayStream* rays = nullptr;
     std::size_t first_ray = 0;  ///< Of the block.
-    std::uint64_t steps = 0;
-    std::uint64_t exhausted = 0;
+    std::vector<std::uint8_t> valid = std::vector<std::uint8_t>(kBlockRays);
     std::vector<Traced> traced{kBlockRays};
     std::vector<InstanceTree::Walk> walks{kBlockRays};  ///< Of the same rays.
     std::vector<std::uint32_t> leaving;                 ///< Rays that go on to their next instance.
@@ -151,7 +148,7 @@ struct SdfTracer::Work {
     std::vector<std::uint32_t> met;  ///< Entries of `active` whose crossing is looked up in `surface`.
     SurfacePoints surface;
 
-    core::Ray ray(std::uint32_t slot) const { return rays.get(first_ray + slot); }
+    core::Ray ray(std::uint32_t slot) const { return rays->get(first_ray + slot); }
 };
 
 SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids,
@@ -200,6 +197,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         boxes[i].maximum += slack;
     }
     tree_ = InstanceTree(boxes);
+    only_instance_ = tree_.only_instance();
 }
 
 bool SdfTracer::meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const {
@@ -279,16 +277,16 @@ void SdfTracer::enter_next_instances(Work& work) const {
         // Those without another instance drop out.
         std::size_t count = 0;
         for (const std::uint32_t slot : work.leaving) {
-            std::uint32_t instance = 0;
+            std::uint32_t instance = only_instance_;
             const double limit = work.traced[slot].nearest.t;
-            if (!work.walks[slot].next(limit, instance)) continue;
+            if (instance == core::kNoIndex && !work.walks[slot].next(limit, instance)) continue;
             entries.ray[count] = static_cast<std::int32_t>(work.first_ray + slot);
             entries.instance[count] = static_cast<std::int32_t>(instance);
             entries.limit[count] = limit;
             work.leaving[count++] = slot;
         }
         if (count > 0) {
-            enter_fields(work.rays, placements_.data(), entries, count,
+            enter_fields(*work.rays, placements_.data(), entries, count,
                          work.march_rays.data() + work.active.size());
         }
         std::size_t missing = 0;
@@ -302,7 +300,7 @@ void SdfTracer::enter_next_instances(Work& work) const {
                 work.leaving[missing++] = slot;
             }
         }
-        work.leaving.resize(missing);
+        work.leaving.resize(only_instance_ == core::kNoIndex ? missing : 0);
     }
 }
 
@@ -420,12 +418,7 @@ glm::vec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) co
 
 core::Hit SdfTracer::finish(const core::Ray& ray, const Traced& traced) const {
     core::Hit hit;
-    hit.steps = traced.steps;
     const Nearest& nearest = traced.nearest;
-    if (!nearest.found()) {
-        if (traced.is_exhausted) hit.status = core::HitStatus::kExhausted;
-        return hit;
-    }
     hit.status = core::HitStatus::kHit;
     hit.t = std::clamp(static_cast<float>(nearest.t), ray.t_min, ray.t_max);
     hit.normal = nearest.is_triangle ? triangle_side(ray, nearest) : field_side(ray, nearest);
@@ -479,8 +472,10 @@ void SdfTracer::march_active(bool any, Work& work) const {
 }
 
 void SdfTracer::trace_block(std::size_t begin, std::size_t end, bool any, Work& work) const {
-    const core::RayStream& rays = work.rays;
+    const core::RayStream& rays = *work.rays;
+    const bool is_one_instance = only_instance_ != core::kNoIndex;
     work.first_ray = begin;
+    core::find_valid_rays(rays, begin, end, work.valid.data());
     work.leaving.clear();
     for (std::size_t i = begin; i < end; ++i) {
         const std::size_t slot = i - begin;
@@ -488,44 +483,58 @@ void SdfTracer::trace_block(std::size_t begin, std::size_t end, bool any, Work& 
         traced.steps = 0;
         traced.is_exhausted = false;
         traced.nearest.instance = core::kNoIndex;
-        const core::Ray ray = rays.get(i);
-        if (!core::is_valid_ray(ray)) continue;
-        traced.nearest.t = ray.t_max;
-        work.walks[slot].start(tree_, glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min,
-                               ray.t_max);
+        if (!work.valid[slot]) continue;
+        traced.nearest.t = rays.t_max[i];
+        if (!is_one_instance) {
+            const core::Ray ray = rays.get(i);
+            work.walks[slot].start(tree_, glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min,
+                                   ray.t_max);
+        }
         work.leaving.push_back(static_cast<std::uint32_t>(slot));
     }
     for (;;) {
         enter_next_instances(work);
         if (work.active.empty()) break;
         march_active(any, work);
+        if (is_one_instance) break;
         for (const std::uint32_t slot : work.active) {
             if (!any || !work.traced[slot].nearest.found()) work.leaving.push_back(slot);
         }
-    }
-    for (std::size_t slot = 0; slot < end - begin; ++slot) {
-        work.steps += work.traced[slot].steps;
-        work.exhausted += work.traced[slot].is_exhausted;
     }
 }
 
 template <typename Finished>
 void SdfTracer::trace(const core::RayStream& rays, bool any, const Finished& finished) const {
-    Work work(rays);
+    // Kept from call to call: to take and to clear so much memory would cost more than to trace a few rays.
+    static thread_local Work work;
+    work.rays = &rays;
+    std::uint64_t steps = 0, exhausted = 0;
     for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
         const std::size_t end = std::min(begin + kBlockRays, rays.size());
         trace_block(begin, end, any, work);
-        for (std::size_t i = begin; i < end; ++i) finished(i, work.traced[i - begin]);
+        for (std::size_t i = begin; i < end; ++i) {
+            const Traced& traced = work.traced[i - begin];
+            steps += traced.steps;
+            exhausted += traced.is_exhausted;
+            finished(i, traced);
+        }
     }
     ray_count_.fetch_add(rays.size(), std::memory_order_relaxed);
-    step_count_.fetch_add(work.steps, std::memory_order_relaxed);
-    exhausted_count_.fetch_add(work.exhausted, std::memory_order_relaxed);
+    step_count_.fetch_add(steps, std::memory_order_relaxed);
+    exhausted_count_.fetch_add(exhausted, std::memory_order_relaxed);
 }
 
 void SdfTracer::trace_closest(const core::RayStream& rays, core::HitStream& hits) const {
     hits.resize(rays.size());
-    trace(rays, false,
-          [&](std::size_t i, const Traced& traced) { hits.set(i, finish(rays.get(i), traced)); });
+    hits.fill_with_misses();
+    trace(rays, false, [&](std::size_t i, const Traced& traced) {
+        if (traced.nearest.found()) {
+            hits.set(i, finish(rays.get(i), traced));
+        } else if (traced.is_exhausted) {
+            hits.status[i] = core::HitStatus::kExhausted;
+        }
+        hits.steps[i] = traced.steps;
+    });
 }
 
 void SdfTracer::trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const {

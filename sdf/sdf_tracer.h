@@ -109,6 +109,7 @@ private:
     std::vector<PlacedGrid> placed_;
     std::vector<FieldPlacement> placements_;  ///< Of the same instances, for the kernel.
     InstanceTree tree_;
+    std::uint32_t only_instance_ = core::kNoIndex;  ///< If there is exactly one.
     bool has_alpha_ = false;
     mutable std::atomic<std::uint64_t> ray_count_{0};
     mutable std::atomic<std::uint64_t> step_count_{0};

@@ -1,6 +1,8 @@
 #include "core/trace/ray_stream.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace core {
 
@@ -44,12 +46,44 @@ void HitStream::resize(std::size_t count) {
     size_ = count;
 }
 
-bool is_valid_ray(const Ray& ray) {
-    const float length_squared = glm::dot(ray.direction, ray.direction);
-    const float origin_sum = ray.origin.x + ray.origin.y + ray.origin.z;
+void HitStream::fill_with_misses() {
+    const Hit miss;
+    for (Column<float>* column : {&normal_x, &normal_y, &normal_z, &barycentric_u, &barycentric_v, &offset}) {
+        std::fill(column->begin(), column->end(), 0.0f);
+    }
+    std::fill(t.begin(), t.end(), miss.t);
+    std::fill(instance.begin(), instance.end(), miss.instance);
+    std::fill(triangle.begin(), triangle.end(), miss.triangle);
+    std::fill(steps.begin(), steps.end(), miss.steps);
+    std::fill(front.begin(), front.end(), std::uint8_t{1});
+    std::fill(status.begin(), status.end(), miss.status);
+}
+
+namespace {
+
+/// The one test, without branches, so that compilers make vectors of it.
+inline bool is_valid(float origin_sum, float length_squared, float t_min, float t_max) {
+    constexpr float kLargest = std::numeric_limits<float>::max();
     // Written so that a NaN anywhere makes the comparison false.
-    return std::abs(length_squared - 1.0f) <= 2e-3f && std::isfinite(origin_sum) &&
-           std::isfinite(ray.t_min) && ray.t_min <= ray.t_max;
+    return (std::abs(length_squared - 1.0f) <= 2e-3f) & (std::abs(origin_sum) <= kLargest) &
+           (std::abs(t_min) <= kLargest) & (t_min <= t_max);
+}
+
+}  // namespace
+
+bool is_valid_ray(const Ray& ray) {
+    const glm::vec3 &o = ray.origin, &d = ray.direction;
+    return is_valid(o.x + o.y + o.z, d.x * d.x + d.y * d.y + d.z * d.z, ray.t_min, ray.t_max);
+}
+
+void find_valid_rays(const RayStream& rays, std::size_t begin, std::size_t end, std::uint8_t* valid) {
+    const float *ox = rays.origin_x.data(), *oy = rays.origin_y.data(), *oz = rays.origin_z.data(),
+                *dx = rays.direction_x.data(), *dy = rays.direction_y.data(), *dz = rays.direction_z.data(),
+                *t_min = rays.t_min.data(), *t_max = rays.t_max.data();
+    for (std::size_t i = begin; i < end; ++i) {
+        valid[i - begin] = is_valid(ox[i] + oy[i] + oz[i], dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i],
+                                    t_min[i], t_max[i]);
+    }
 }
 
 }  // namespace core

@@ -115,6 +115,9 @@ public:
     /// Sets the number of hits; contents are unspecified until a tracer fills them.
     void resize(std::size_t count);
 
+    /// Makes every hit a miss.
+    void fill_with_misses();
+
     void set(std::size_t index, const Hit& hit) {
         t[index] = hit.t;
         normal_x[index] = hit.normal.x;
@@ -157,5 +160,8 @@ private:
 /// length within 1e-3, t_max a number, t_min <= t_max. Every tracer misses on all other rays, by this one
 /// test.
 bool is_valid_ray(const Ray& ray);
+
+/// is_valid_ray() of rays begin to end - 1: valid[0] belongs to ray `begin`. @pre room for end - begin
+void find_valid_rays(const RayStream& rays, std::size_t begin, std::size_t end, std::uint8_t* valid);
 
 }  // namespace core
