@@ -36,8 +36,8 @@ ScalarFieldTracer::ScalarFieldTracer(const core::Scene& scene,
 ScalarFieldTracer::Nearest ScalarFieldTracer::first_crossing(const core::Ray& ray, bool any) const {
     Nearest nearest;
     nearest.t = ray.t_max;
-    sdf::InstanceTree::Walk walk(tree_, glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min,
-                                 nearest.t);
+    sdf::InstanceTree::Walk walk;
+    walk.start(tree_, glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min, nearest.t);
     std::uint32_t instance = 0;
     while (walk.next(nearest.t, instance)) {
         const Placed& placed = placed_[instance];
