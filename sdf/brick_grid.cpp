@@ -41,6 +41,18 @@ LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf) {
     return occupied;
 }
 
+/// The cells of a brick that hold a crossing lie within [first, end).
+CellBox occupied_box(const Brick& brick) {
+    CellBox box{glm::ivec3(kBrickCells), glm::ivec3(0)};
+    for (int cell = 0; cell < kBrickCells * kBrickCells * kBrickCells; ++cell) {
+        const glm::ivec3 position(cell / 49, cell / 7 % 7, cell % 7);
+        if (!brick.is_occupied(position.x, position.y, position.z)) continue;
+        box.first = glm::min(box.first, position);
+        box.end = glm::max(box.end, position + 1);
+    }
+    return box;
+}
+
 /// Gives samples that the band does not hold the sign of their neighbours, in waves from those it holds.
 void fill_unknown(std::array<std::int16_t, kBrickSize>& sample, std::bitset<kBrickSize> is_known) {
     constexpr std::int16_t kFarthest = 32767;
@@ -207,11 +219,45 @@ void BrickGrid::fill_empty_distances() {
             }
         });
     }
-    for (std::size_t i = 0; i < top_.size(); ++i) {
-        if (top_[i] >= 0) continue;
-        const double voxels = kBrickCells * std::sqrt(static_cast<double>(squared[i]));
-        top_[i] = -1 - static_cast<std::int32_t>(std::floor(voxels * (1.0 - 1e-12) / kDistanceStep));
+    std::vector<CellBox> boxes(bricks_.size());
+    for (std::size_t i = 0; i < bricks_.size(); ++i) boxes[i] = occupied_box(bricks_[i]);
+    std::vector<std::int32_t> entries = top_;
+    core::parallel_for(static_cast<std::size_t>(count.x), 1, [&](std::size_t begin, std::size_t end) {
+        for (glm::ivec3 block(static_cast<int>(begin), 0, 0); block.x < static_cast<int>(end); ++block.x) {
+            for (block.y = 0; block.y < count.y; ++block.y) {
+                for (block.z = 0; block.z < count.z; ++block.z) {
+                    const std::size_t i = block_index(block);
+                    if (top_[i] >= 0) continue;
+                    double voxels = kBrickCells * std::sqrt(static_cast<double>(squared[i]));
+                    if (squared[i] < kNearBlocks * kNearBlocks) voxels = distance_to_near_cells(block, boxes);
+                    entries[i] =
+                        -1 - static_cast<std::int32_t>(std::floor(voxels * (1.0 - 1e-12) / kDistanceStep));
+                }
+            }
+        }
+    });
+    top_ = std::move(entries);
+}
+
+double BrickGrid::distance_to_near_cells(const glm::ivec3& block, const std::vector<CellBox>& boxes) const {
+    // Bricks farther off leave a gap of kNearBlocks at least.
+    double nearest = kBrickCells * kNearBlocks;
+    const glm::ivec3 low = glm::max(block - kNearBlocks, glm::ivec3(0)),
+                     high = glm::min(block + kNearBlocks, block_count_ - 1);
+    for (glm::ivec3 other = low; other.x <= high.x; ++other.x) {
+        for (other.y = low.y; other.y <= high.y; ++other.y) {
+            for (other.z = low.z; other.z <= high.z; ++other.z) {
+                const std::int32_t entry = top_[block_index(other)];
+                if (entry < 0) continue;
+                const CellBox& box = boxes[static_cast<std::size_t>(entry)];
+                const glm::ivec3 first = (other - block) * kBrickCells;
+                const glm::ivec3 gap =
+                    glm::max(glm::max(first + box.first - kBrickCells, -(first + box.end)), glm::ivec3(0));
+                nearest = std::min(nearest, glm::length(glm::dvec3(gap)));
+            }
+        }
     }
+    return nearest;
 }
 
 core::DoubleBounds BrickGrid::local_bounds() const {

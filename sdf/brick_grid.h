@@ -21,6 +21,11 @@ namespace sdf {
 
 class LeafMap;
 
+/// Cells of a brick from `first` up to `end`.
+struct CellBox {
+    glm::ivec3 first, end;
+};
+
 /// Cells, and samples, along one side of a brick.
 inline constexpr int kBrickCells = 7;
 inline constexpr int kBrickSamples = kBrickCells + 1;
@@ -110,6 +115,7 @@ public:
 
 private:
     static constexpr double kDistanceStep = 1.0 / 64.0;
+    static constexpr int kNearBlocks = 2;
     static constexpr std::uint16_t kNoPaletteEntry = 0xffff;
 
     std::size_t block_index(const glm::ivec3& block) const {
@@ -118,6 +124,8 @@ private:
     void fill_brick(const LeafMap& map, const glm::ivec3& first_sample, Brick& brick,
                     std::vector<std::uint32_t>& palette) const;
     void fill_empty_distances();
+    /// Voxels from an empty block to the nearest occupied cell within kNearBlocks, or as many blocks.
+    double distance_to_near_cells(const glm::ivec3& block, const std::vector<CellBox>& boxes) const;
 
     FieldInfo info_;
     glm::dvec3 origin_{0.0};

@@ -28,8 +28,6 @@ constexpr std::size_t kMostLanes = HWY_MAX_BYTES / sizeof(float);
 constexpr float kBlockCells = 7.0f;
 /// Bytes from a sample to its neighbours along y and x, and from brick to brick.
 constexpr int kSampleBytesY = 16, kSampleBytesX = 128, kLogBrickBytes = 10;
-/// Distances on the lattice change by at most 1 a voxel, but those between samples by up to sqrt(3).
-constexpr float kSafePart = 0.57735f;
 /// Kept back from every step, in voxels: more than positions round within 4096 of them.
 constexpr float kStepMargin = 1e-3f;
 constexpr float kHuge = 1e30f;
@@ -38,7 +36,8 @@ constexpr float kHuge = 1e30f;
 struct alignas(64) Packet {
     float ox[kMostLanes], oy[kMostLanes], oz[kMostLanes];
     float dx[kMostLanes], dy[kMostLanes], dz[kMostLanes];
-    float ix[kMostLanes], iy[kMostLanes], iz[kMostLanes];  ///< 1 / direction.
+    float ix[kMostLanes], iy[kMostLanes], iz[kMostLanes];        ///< 1 / direction.
+    float up_x[kMostLanes], up_y[kMostLanes], up_z[kMostLanes];  ///< 1 where the direction is positive, or 0.
     float length[kMostLanes];
     float count_x[kMostLanes], count_y[kMostLanes], count_z[kMostLanes];
     std::int32_t top_base[kMostLanes], stride_x[kMostLanes], stride_y[kMostLanes];
@@ -159,9 +158,10 @@ HWY_INLINE HWY_ATTR void fetch(const FieldTable& fields, Packet& p) {
     const Floats in_brick =
         ((cx - block_x) * hn::Set(kFloat, 64.0f) + (cy - block_y) * hn::Set(kFloat, 8.0f)) + (cz - block_z);
     // Empty blocks read the first brick.
-    const Ints offset = hn::IfThenZeroElse(
-        hn::Lt(entry, hn::Zero(kInt)),
-        hn::ShiftLeft<kLogBrickBytes>(entry) + hn::ShiftLeft<1>(hn::ConvertTo(kInt, in_brick)));
+    const Ints offset =
+        hn::IfThenZeroElse(hn::Lt(entry, hn::Zero(kInt)),
+                           hn::ShiftLeft<kLogBrickBytes>(hn::And(entry, hn::Set(kInt, kBrickMask))) +
+                               hn::ShiftLeft<1>(hn::ConvertTo(kInt, in_brick)));
     // Two samples along z in a word.
     const auto* base = reinterpret_cast<const std::int32_t*>(fields.samples);
     hn::Store(block_x, kFloat, p.block_x);
@@ -201,32 +201,19 @@ HWY_INLINE HWY_ATTR Place place_at(const Packet& p, Floats s) {
             unit_clamped(hn::Load(kFloat, p.oz) + s * hn::Load(kFloat, p.dz) - hn::Load(kFloat, p.cz))};
 }
 
-/// Where the rays leave the region that has one answer: the whole block where it is empty, else the cell.
+/// Where rays leave a box of cells: how far along the ray each axis's plane lies.
 struct Exit {
-    Floats low_x, low_y, low_z, size;  ///< The region.
-    Mask up_x, up_y, up_z;             ///< Which way the ray goes.
-    Floats x, y, z;                    ///< Distance to the region's planes.
-    Floats nearest;                    ///< The least of them, but not before s.
+    Floats x, y, z;
+
+    HWY_ATTR Floats nearest() const { return hn::Min(x, hn::Min(y, z)); }
 };
 
-HWY_INLINE HWY_ATTR Exit exit_of(const Packet& p, Mask is_empty, Floats s) {
-    const Floats zero = hn::Zero(kFloat);
-    Exit exit;
-    exit.low_x = hn::IfThenElse(is_empty, hn::Load(kFloat, p.block_x), hn::Load(kFloat, p.cx));
-    exit.low_y = hn::IfThenElse(is_empty, hn::Load(kFloat, p.block_y), hn::Load(kFloat, p.cy));
-    exit.low_z = hn::IfThenElse(is_empty, hn::Load(kFloat, p.block_z), hn::Load(kFloat, p.cz));
-    exit.size = hn::IfThenElse(is_empty, hn::Set(kFloat, kBlockCells), hn::Set(kFloat, 1.0f));
-    exit.up_x = hn::Ge(hn::Load(kFloat, p.dx), zero);
-    exit.up_y = hn::Ge(hn::Load(kFloat, p.dy), zero);
-    exit.up_z = hn::Ge(hn::Load(kFloat, p.dz), zero);
-    exit.x = (exit.low_x + hn::IfThenElseZero(exit.up_x, exit.size) - hn::Load(kFloat, p.ox)) *
-             hn::Load(kFloat, p.ix);
-    exit.y = (exit.low_y + hn::IfThenElseZero(exit.up_y, exit.size) - hn::Load(kFloat, p.oy)) *
-             hn::Load(kFloat, p.iy);
-    exit.z = (exit.low_z + hn::IfThenElseZero(exit.up_z, exit.size) - hn::Load(kFloat, p.oz)) *
-             hn::Load(kFloat, p.iz);
-    exit.nearest = hn::Max(s, hn::Min(exit.x, hn::Min(exit.y, exit.z)));
-    return exit;
+HWY_INLINE HWY_ATTR Exit exit_of(const Packet& p, Floats low_x, Floats low_y, Floats low_z, Floats size) {
+    const auto plane = [&](Floats low, const float* up, const float* origin, const float* inverse) HWY_ATTR {
+        return (low + size * hn::Load(kFloat, up) - hn::Load(kFloat, origin)) * hn::Load(kFloat, inverse);
+    };
+    return {plane(low_x, p.up_x, p.ox, p.ix), plane(low_y, p.up_y, p.oy, p.iy),
+            plane(low_z, p.up_z, p.oz, p.iz)};
 }
 
 /// The lanes that a step ends: with a hit, with a cell to be searched for one, or with nothing.
@@ -237,11 +224,17 @@ struct Ended {
 /// Takes one step with every lane, from what fetch() read.
 template <HitMode kMode>
 HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
-    const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f);
+    const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f), seven = hn::Set(kFloat, kBlockCells);
     const Floats s = hn::Load(kFloat, p.s);
     const Ints entry = hn::Load(kInt, p.entry);
     const Mask is_empty = hn::RebindMask(kFloat, hn::Lt(entry, hn::Zero(kInt)));
-    const Exit exit = exit_of(p, is_empty, s);
+    const Floats cx = hn::Load(kFloat, p.cx), cy = hn::Load(kFloat, p.cy), cz = hn::Load(kFloat, p.cz);
+    const Floats block_x = hn::Load(kFloat, p.block_x), block_y = hn::Load(kFloat, p.block_y),
+                 block_z = hn::Load(kFloat, p.block_z);
+    const Exit of_block = exit_of(p, block_x, block_y, block_z, seven);
+    const Exit of_cell = exit_of(p, cx, cy, cz, one);
+    const Floats block_exit = of_block.nearest();
+    Mask whole_block = is_empty;  // Nothing can be met in the rest of the block.
     const Mask no_lane = hn::Lt(zero, zero);
     Ended ended{no_lane, no_lane, no_lane, no_lane};
 
@@ -271,7 +264,10 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
         Floats hit_s = s;
 
         const Floats step_voxels = hn::Set(kFloat, kSampleStepVoxels);
-        Floats safe = hn::Abs(value) * (step_voxels * hn::Set(kFloat, kSafePart));
+        // Within the brick no more than its gradients allow.
+        const Floats part = hn::ConvertTo(kFloat, hn::ShiftRight<kBrickBits>(entry) + hn::Set(kInt, 1)) *
+                            hn::Set(kFloat, kSampleStepVoxels / 256.0f);
+        Floats safe = hn::Abs(value) * part;
         if constexpr (kMode == HitMode::kEps) {
             // Distance to the surface ahead; the slope tells whether the ray comes nearer at all.
             const Floats ahead = value * sign;
@@ -295,7 +291,7 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
                 hn::AndNot(hn::Or(uniform, is_empty), hn::Eq(hn::Load(kFloat, p.searched), zero));
             safe = hn::IfThenElseZero(uniform, safe);
             if (!hn::AllFalse(kFloat, mixed)) {
-                const Place far = place_at(p, exit.nearest);
+                const Place far = place_at(p, hn::Max(s, of_cell.nearest()));
                 Mask may_cross;
                 if constexpr (kMode == HitMode::kSecant) {
                     const Floats far_value = corners.at(far.x, far.y, far.z);
@@ -319,34 +315,40 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
         ended.hit = hn::And(ended.hit, hn::Le(hit_s, hn::Load(kFloat, p.length)));
         hn::Store(hit_s, kFloat, p.hit_s);
         reach = hn::IfThenElse(is_empty, reach, safe);
+        // Beyond the brick its gradients say nothing.
+        whole_block = hn::Or(is_empty, hn::Gt(s + (safe - hn::Set(kFloat, kStepMargin)), block_exit));
     }
 
-    // On, as far as nothing can be met.
+    // On, as far as nothing can be met: out of the block, out of the cell, or to a place between.
+    const Floats region_exit = hn::Max(s, hn::IfThenElse(whole_block, block_exit, of_cell.nearest()));
     const Floats safe_s = s + (reach - hn::Set(kFloat, kStepMargin));
-    const Mask jumps = hn::Gt(safe_s, exit.nearest);
-    const Floats next = hn::IfThenElse(jumps, safe_s, exit.nearest);
+    const Mask jumps = hn::And(hn::Gt(safe_s, region_exit), hn::Or(is_empty, hn::Not(whole_block)));
+    const Floats next = hn::IfThenElse(jumps, safe_s, region_exit);
     const Floats count_x = hn::Load(kFloat, p.count_x), count_y = hn::Load(kFloat, p.count_y),
                  count_z = hn::Load(kFloat, p.count_z);
-    const auto cell_after = [&](const float* origin, const float* direction, Floats low,
-                                Floats count) HWY_ATTR {
-        const Floats cell = hn::Floor(hn::Load(kFloat, origin) + next * hn::Load(kFloat, direction));
-        const Floats from = hn::IfThenZeroElse(jumps, low);
-        const Floats to = hn::IfThenElse(jumps, count, low + exit.size) - one;
-        return hn::Min(hn::Max(cell, from), to);
-    };
-    Floats next_x = cell_after(p.ox, p.dx, exit.low_x, count_x),
-           next_y = cell_after(p.oy, p.dy, exit.low_y, count_y),
-           next_z = cell_after(p.oz, p.dz, exit.low_z, count_z);
-    // Through a face: the neighbour across it, by number and not by position.
+    const Floats size = hn::IfThenElse(whole_block, seven, one);
+    const Mask jumps_far = hn::And(jumps, is_empty);
+    const Exit exit{hn::IfThenElse(whole_block, of_block.x, of_cell.x),
+                    hn::IfThenElse(whole_block, of_block.y, of_cell.y),
+                    hn::IfThenElse(whole_block, of_block.z, of_cell.z)};
     const Mask across_x = hn::AndNot(jumps, hn::And(hn::Le(exit.x, exit.y), hn::Le(exit.x, exit.z)));
     const Mask across_y = hn::AndNot(hn::Or(jumps, across_x), hn::Le(exit.y, exit.z));
     const Mask across_z = hn::Not(hn::Or(jumps, hn::Or(across_x, across_y)));
-    next_x =
-        hn::IfThenElse(across_x, hn::IfThenElse(exit.up_x, exit.low_x + exit.size, exit.low_x - one), next_x);
-    next_y =
-        hn::IfThenElse(across_y, hn::IfThenElse(exit.up_y, exit.low_y + exit.size, exit.low_y - one), next_y);
-    next_z =
-        hn::IfThenElse(across_z, hn::IfThenElse(exit.up_z, exit.low_z + exit.size, exit.low_z - one), next_z);
+    // A jump lands within its block, or anywhere from an empty one; else the ray goes through a face, to the
+    // neighbour across it by number and not by position.
+    const auto cell_after = [&](const float* origin, const float* direction, const float* up, Floats cell,
+                                Floats block, Floats count, Mask across) HWY_ATTR {
+        const Floats at = hn::Floor(hn::Load(kFloat, origin) + next * hn::Load(kFloat, direction));
+        const Floats region = hn::IfThenElse(hn::Or(whole_block, jumps), block, cell);
+        const Floats low = hn::IfThenZeroElse(jumps_far, region);
+        const Floats last =
+            hn::IfThenElse(jumps_far, count, region + hn::IfThenElse(jumps, seven, size)) - one;
+        const Floats inside = hn::Min(hn::Max(at, low), last);
+        return hn::IfThenElse(across, region + (hn::Load(kFloat, up) * (size + one) - one), inside);
+    };
+    const Floats next_x = cell_after(p.ox, p.dx, p.up_x, cx, block_x, count_x, across_x),
+                 next_y = cell_after(p.oy, p.dy, p.up_y, cy, block_y, count_y, across_y),
+                 next_z = cell_after(p.oz, p.dz, p.up_z, cz, block_z, count_z, across_z);
 
     const Ints steps = hn::Load(kInt, p.steps) + hn::Set(kInt, 1);
     hn::Store(steps, kInt, p.steps);
@@ -359,9 +361,9 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
     ended.exhausted = hn::AndNot(hn::Or(stays, ended.gone),
                                  hn::RebindMask(kFloat, hn::Gt(steps, hn::Load(kInt, p.step_cap))));
     hn::Store(hn::IfThenElse(stays, s, next), kFloat, p.s);
-    hn::Store(hn::IfThenElse(stays, hn::Load(kFloat, p.cx), next_x), kFloat, p.cx);
-    hn::Store(hn::IfThenElse(stays, hn::Load(kFloat, p.cy), next_y), kFloat, p.cy);
-    hn::Store(hn::IfThenElse(stays, hn::Load(kFloat, p.cz), next_z), kFloat, p.cz);
+    hn::Store(hn::IfThenElse(stays, cx, next_x), kFloat, p.cx);
+    hn::Store(hn::IfThenElse(stays, cy, next_y), kFloat, p.cy);
+    hn::Store(hn::IfThenElse(stays, cz, next_z), kFloat, p.cz);
     hn::Store(zero, kFloat, p.searched);
     return ended;
 }
@@ -372,7 +374,8 @@ HWY_INLINE HWY_ATTR Mask search_cell(Packet& p) {
     const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f);
     const Floats s = hn::Load(kFloat, p.s);
     const Corners corners = load_corners(p);
-    const Floats part = exit_of(p, hn::Lt(zero, zero), s).nearest - s;
+    const Exit exit = exit_of(p, hn::Load(kFloat, p.cx), hn::Load(kFloat, p.cy), hn::Load(kFloat, p.cz), one);
+    const Floats part = hn::Max(s, exit.nearest()) - s;
     const Place near = place_at(p, s), far = place_at(p, s + part);
     const Floats gx = far.x - near.x, gy = far.y - near.y, gz = far.z - near.z;
     const Mask negative = is_negative(hn::Load(kFloat, p.sign));
@@ -415,6 +418,9 @@ HWY_INLINE HWY_ATTR void load_lane(Packet& p, std::size_t lane, const MarchRay& 
     p.ix[lane] = inverse(ray.direction[0]);
     p.iy[lane] = inverse(ray.direction[1]);
     p.iz[lane] = inverse(ray.direction[2]);
+    p.up_x[lane] = ray.direction[0] >= 0.0f ? 1.0f : 0.0f;
+    p.up_y[lane] = ray.direction[1] >= 0.0f ? 1.0f : 0.0f;
+    p.up_z[lane] = ray.direction[2] >= 0.0f ? 1.0f : 0.0f;
     p.length[lane] = ray.length;
     p.count_x[lane] = ray.cell_count[0];
     p.count_y[lane] = ray.cell_count[1];
@@ -455,6 +461,7 @@ HWY_INLINE HWY_ATTR void idle_lane(Packet& p, std::size_t lane) {
     p.ox[lane] = p.oy[lane] = p.oz[lane] = 0.0f;
     p.dx[lane] = p.dy[lane] = p.dz[lane] = 0.0f;
     p.ix[lane] = p.iy[lane] = p.iz[lane] = kHuge;
+    p.up_x[lane] = p.up_y[lane] = p.up_z[lane] = 1.0f;
     p.length[lane] = kHuge;
     p.count_x[lane] = p.count_y[lane] = p.count_z[lane] = kHuge;
     p.top_base[lane] = p.stride_x[lane] = p.stride_y[lane] = 0;
@@ -476,7 +483,7 @@ HWY_INLINE HWY_ATTR std::uint64_t bits_of(Mask mask) {
 HWY_INLINE HWY_ATTR void store_lane(const Packet& p, std::size_t lane, MarchStatus status, float distance,
                                     MarchHit& hit) {
     hit.distance = distance;
-    hit.brick = p.entry[lane];
+    hit.brick = p.entry[lane] & kBrickMask;
     hit.cell[0] = static_cast<std::int16_t>(p.cx[lane]);
     hit.cell[1] = static_cast<std::int16_t>(p.cy[lane]);
     hit.cell[2] = static_cast<std::int16_t>(p.cz[lane]);

@@ -28,10 +28,16 @@ enum class HitMode : std::uint8_t {
 /// Below this distance a sample counts as a hit in HitMode::kEps, in voxels.
 inline constexpr float kHitEpsVoxels = 0.1f;
 
+inline constexpr int kBrickBits = 21;
+inline constexpr std::int32_t kBrickMask = (1 << kBrickBits) - 1;
+
 /// Fields of many meshes laid out for the kernel: blocks of 7^3 cells, those near the surface with a brick of
 /// 8^3 samples (see brick_grid.h for what an entry means).
 struct FieldTable {
-    const std::int32_t* top = nullptr;      ///< Entries of all fields; bricks count over all fields.
+    /// Entries of all fields, by block. Negative: empty, as in BrickGrid. Else the brick's number over all
+    /// fields in kBrickBits bits, and above them, in 256ths less one, the part of a sample's distance that is
+    /// a safe step within the brick.
+    const std::int32_t* top = nullptr;
     const std::int16_t* samples = nullptr;  ///< kBrickSize a brick, as in Brick, and one more in all.
 };
 

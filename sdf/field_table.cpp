@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bitset>
+#include <cmath>
 
 #include "core/support/error.h"
 #include "core/support/parallel.h"
@@ -12,6 +13,28 @@
 namespace sdf {
 
 namespace {
+
+/// The part of a sample's distance that may be stepped within a brick, in 256ths less one: 1 over the largest
+/// gradient of the trilinear field there. Along each axis that is at most the largest difference between
+/// neighbours of the cell; all three together are bounded by their root of squares.
+std::int32_t safe_part(const Brick& brick) {
+    double largest_squared = 1e-6;
+    for (int cell = 0; cell < kBrickCells * kBrickCells * kBrickCells; ++cell) {
+        const int first = Brick::index(cell / 49, cell / 7 % 7, cell % 7);
+        const auto difference = [&](int a, int b) {
+            return std::abs(static_cast<double>(brick.voxels(first + a)) - brick.voxels(first + b));
+        };
+        const double x =
+            std::max({difference(0, 64), difference(1, 65), difference(8, 72), difference(9, 73)});
+        const double y =
+            std::max({difference(0, 8), difference(1, 9), difference(64, 72), difference(65, 73)});
+        const double z =
+            std::max({difference(0, 1), difference(8, 9), difference(64, 65), difference(72, 73)});
+        largest_squared = std::max(largest_squared, x * x + y * y + z * z);
+    }
+    const double part = std::floor(256.0 / std::sqrt(largest_squared) * (1.0 - 1e-6)) - 1.0;
+    return static_cast<std::int32_t>(std::clamp(part, 0.0, 255.0));
+}
 
 /// The gradients at the corners of a brick's occupied cells; nobody asks for others.
 void copy_gradients(const BrickGrid& grid, const glm::ivec3& block, const Brick& brick, std::int32_t* to) {
@@ -79,7 +102,10 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
 void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place,
                            std::size_t palette_base) {
     std::transform(grid.top().begin(), grid.top().end(), top_.begin() + place.top_base,
-                   [&](std::int32_t entry) { return entry >= 0 ? entry + place.brick_base : entry; });
+                   [&](std::int32_t entry) {
+                       if (entry < 0) return entry;
+                       return (entry + place.brick_base) | safe_part(grid.brick_at(entry)) << kBrickBits;
+                   });
     std::transform(
         grid.palettes().begin(), grid.palettes().end(),
         palettes_.begin() + static_cast<std::ptrdiff_t>(palette_base),

@@ -46,7 +46,7 @@ public:
     std::size_t bytes() const;
 
     /// Kernels address samples by 32 bits: 2 GiB of them.
-    static constexpr std::size_t kMostBricks = (std::size_t{1} << 21) - 1;
+    static constexpr std::size_t kMostBricks = std::size_t{1} << kBrickBits;
 
 private:
     void copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place,
