@@ -620,6 +620,7 @@ HWY_EXPORT(march_rays_cubic);
 
 void march_rays(const FieldTable& fields, HitMode mode, std::span<const MarchRay> rays,
                 std::span<MarchHit> hits) {
+    if (rays.empty()) return;
     switch (mode) {
         case HitMode::kEps:
             HWY_DYNAMIC_DISPATCH(march_rays_eps)(fields, rays.data(), hits.data(), rays.size());

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 namespace {
 
@@ -129,6 +130,28 @@ TEST(ValidRay, IsFiniteUnitAndOrdered) {
         ray.direction *= length;
         EXPECT_FALSE(core::is_valid_ray(ray)) << "length " << length;
     }
+}
+
+TEST(RayStream, ManyRaysAreTestedAsOneIs) {
+    core::RayStream stream;
+    for (const float bad : {0.0f, -0.0f, 1.0f, 0.8f, 1e-40f, 3e38f, kInfinity, -kInfinity, kNaN}) {
+        for (int component = 0; component < 8; ++component) {
+            core::Ray ray = good_ray();
+            float* parts[] = {&ray.origin.x,    &ray.origin.y,    &ray.origin.z,    &ray.t_min,
+                              &ray.direction.x, &ray.direction.y, &ray.direction.z, &ray.t_max};
+            *parts[component] = bad;
+            stream.push_back(ray);
+        }
+    }
+    std::vector<std::uint8_t> valid(stream.size() - 3);
+    core::find_valid_rays(stream, 3, stream.size(), valid.data());
+    std::size_t valid_count = 0;
+    for (std::size_t i = 0; i < valid.size(); ++i) {
+        EXPECT_EQ(valid[i] != 0, core::is_valid_ray(stream.get(i + 3))) << "ray " << i + 3;
+        valid_count += valid[i];
+    }
+    EXPECT_GT(valid_count, 10u);
+    EXPECT_LT(valid_count, valid.size() - 10);
 }
 
 }  // namespace
