@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 namespace core {
 
@@ -37,41 +39,50 @@ ErrorInterval of_one_block(const Total& total) {
     return a.columns == b.columns && a.rows == b.rows && a.pixels == b.pixels;
 }
 
-/// Where the runs of two begin that a row of `count` falls into; the last is of three where `count` is odd.
-std::vector<int> run_starts(int count) {
-    std::vector<int> starts;
-    for (int i = 0; i == 0 || i + 1 < count; i += 2) starts.push_back(i);
-    starts.push_back(count);
-    return starts;
+using Values = std::vector<double>;  ///< One a block.
+
+double dot(const Values& a, const Values& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-/// The variance of a sum, and its degrees of freedom.
-struct Variance {
-    double value = 0.0;
-    double degrees_of_freedom = 0.0;
-};
+/// Takes the part along a unit vector away.
+void remove_part(Values& values, const Values& direction) {
+    const double part = dot(values, direction);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] -= part * direction[i];
+}
 
-/// Of the blocks [left, right) x [top, bottom), from how they scatter around what they have in common; a
-/// block's variance is taken to grow with its pixels.
-Variance variance_of_group(const BlockErrors& errors, int left, int right, int top, int bottom) {
-    const auto for_each_block = [&](const auto& visit) {
-        for (int row = top; row < bottom; ++row) {
-            for (int column = left; column < right; ++column) {
-                const auto block = static_cast<std::size_t>(row * errors.columns + column);
-                visit(errors.sums[block], errors.pixels[block]);
-            }
+/// Orthonormal vectors that span the predictors (Gram and Schmidt); what the others span already is left out.
+std::vector<Values> basis_of(const std::vector<Values>& predictors) {
+    constexpr double kRounding = 1e-8;  // Of a predictor's length, twice that of what is lost by subtracting.
+    std::vector<Values> basis;
+    for (const Values& predictor : predictors) {
+        const double length = std::sqrt(dot(predictor, predictor));
+        if (!(length > 0.0) || !std::isfinite(length)) continue;
+        Values rest = predictor;
+        for (double& value : rest) value /= length;
+        for (int pass = 0; pass < 2; ++pass) {  // The second removes what rounding left in the first.
+            for (const Values& direction : basis) remove_part(rest, direction);
         }
-    };
-    Total total;
-    for_each_block([&](double sum, double pixels) { total.add(sum, pixels); });
-    const double mean = total.sum / total.pixels;
-    double squares = 0.0;
-    for_each_block([&](double sum, double pixels) {
-        const double residual = sum - pixels * mean;
-        squares += residual * residual / pixels;
-    });
-    const double degrees = (right - left) * (bottom - top) - 1.0;
-    return {total.pixels * squares / degrees, degrees};
+        const double rest_length = std::sqrt(dot(rest, rest));
+        if (rest_length < kRounding) continue;
+        for (double& value : rest) value /= rest_length;
+        basis.push_back(std::move(rest));
+    }
+    return basis;
+}
+
+/// How far each value is from what a fit of all others to the predictors says.
+Values distances_from_prediction(Values values, const std::vector<Values>& predictors) {
+    constexpr double kAlone = 1e-6;  // A block that has a predictor for itself; the others say nothing of it.
+    const std::vector<Values> basis = basis_of(predictors);
+    const Values before = values;
+    for (const Values& direction : basis) remove_part(values, direction);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        double leverage = 0.0;
+        for (const Values& direction : basis) leverage += direction[i] * direction[i];
+        values[i] = 1.0 - leverage > kAlone ? values[i] / (1.0 - leverage) : before[i];
+    }
+    return values;
 }
 
 }  // namespace
@@ -107,6 +118,15 @@ BlockErrors mixed(const BlockErrors& a, const BlockErrors& b, double share) {
     return result;
 }
 
+void accumulate(BlockErrors& sum, const BlockErrors& other, double weight) {
+    if (sum.sums.empty()) {
+        sum = other;
+        sum.sums.assign(other.sums.size(), 0.0);
+    }
+    assert(equal_blocks(sum, other));
+    for (std::size_t i = 0; i < sum.sums.size(); ++i) sum.sums[i] += weight * other.sums[i];
+}
+
 ErrorInterval mean_error(const BlockErrors& errors) {
     const Total total = total_of(errors);
     const std::size_t count = errors.sums.size();
@@ -119,29 +139,32 @@ ErrorInterval mean_error(const BlockErrors& errors) {
                             static_cast<double>(count - 1));
 }
 
-ErrorInterval paired_difference(const BlockErrors& a, const BlockErrors& b) {
-    assert(equal_blocks(a, b));
+ErrorInterval paired_difference(const BlockErrors& a, const BlockErrors& b,
+                                std::span<const BlockErrors> predictors, double hidden_share) {
     BlockErrors difference = a;
-    for (std::size_t i = 0; i < a.sums.size(); ++i) difference.sums[i] -= b.sums[i];
+    accumulate(difference, b, -1.0);
     const Total total = total_of(difference);
-    if (difference.sums.size() == 1) return of_one_block(total);
+    const std::size_t count = difference.sums.size();
+    assert(count > 0);
+    if (count == 1) return of_one_block(total);
 
-    const std::vector<int> columns = run_starts(difference.columns), rows = run_starts(difference.rows);
-    std::vector<Variance> groups;
-    double variance = 0.0;
-    for (std::size_t y = 0; y + 1 < rows.size(); ++y) {
-        for (std::size_t x = 0; x + 1 < columns.size(); ++x) {
-            groups.push_back(variance_of_group(difference, columns[x], columns[x + 1], rows[y], rows[y + 1]));
-            variance += groups.back().value;
-        }
+    std::vector<Values> spanned = {difference.pixels};  // What is alike all over the picture.
+    for (const BlockErrors& predictor : predictors) spanned.push_back(predictor.sums);
+    double squares = 0.0, fourth_powers = 0.0;
+    const Values distances = distances_from_prediction(difference.sums, spanned);
+    const double largest = std::abs(*std::max_element(
+        distances.begin(), distances.end(), [](double x, double y) { return std::abs(x) < std::abs(y); }));
+    const double scale = largest > 0.0 ? largest : 1.0;  // Fourth powers leave the range of a double soon.
+    for (const double distance : distances) {
+        const double square = distance / scale * (distance / scale);
+        squares += square;
+        fourth_powers += square * square;
     }
-    double inverse_degrees = 0.0;
-    for (const Variance& group : groups) {
-        const double share = variance > 0.0 ? group.value / variance : 1.0;  // Equal pictures differ nowhere.
-        inverse_degrees += share * share / group.degrees_of_freedom;
-    }
-    return student_interval(total.sum / total.pixels, std::sqrt(variance) / total.pixels,
-                            std::max(1.0 / inverse_degrees, 1.0));
+    // The mean fourth power of normal noise is three times its variance squared.
+    const double degrees = fourth_powers > 0.0 ? 3.0 * squares * squares / fourth_powers : 1.0;
+    return student_interval(total.sum / total.pixels,
+                            scale * std::sqrt((1.0 + hidden_share) * squares) / total.pixels,
+                            std::clamp(degrees, 1.0, static_cast<double>(count - 1)));
 }
 
 }  // namespace core
