@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "cli/picture_metrics.h"
 #include "cli/report.h"
 
 namespace cli {
@@ -23,7 +24,8 @@ json as_json(const std::optional<Estimate>& estimate) {
 }
 
 json as_json(const ReportPoint& point) {
-    const core::ImageMetrics& metrics = point.metrics;
+    json metrics = metrics_json({.image = point.metrics, .flip = point.flip}, false);
+    metrics["leak_counts"] = point.metrics.leak.counts;
     return {{"samples_per_pixel", point.samples_per_pixel},
             {"seed", point.seed},
             {"seconds", point.seconds},
@@ -31,24 +33,7 @@ json as_json(const ReportPoint& point) {
             {"rays", point.rays},
             {"rel_mse", as_json(point.rel_mse)},
             {"pareto", point.pareto},
-            {"metrics",
-             {{"mse", number(metrics.mse)},
-              {"rel_mse", number(metrics.rel_mse)},
-              {"rel_mse_trimmed", number(metrics.rel_mse_trimmed)},
-              {"mrse", number(metrics.mrse)},
-              {"mape", number(metrics.mape)},
-              {"smape", number(metrics.smape)},
-              {"percentiles",
-               {{"50", number(metrics.p50)},
-                {"95", number(metrics.p95)},
-                {"99", number(metrics.p99)},
-                {"99.9", number(metrics.p99_9)}}},
-              {"max", number(metrics.max)},
-              {"energy_bias", number(metrics.energy_bias_percent)},
-              {"leak", number(metrics.leak.energy_fraction)},
-              {"leak_counts", metrics.leak.counts},
-              {"flip", number(point.flip)},
-              {"nonfinite_pixels", metrics.nonfinite_pixels}}},
+            {"metrics", metrics},
             {"command", point.command}};
 }
 
