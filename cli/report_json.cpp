@@ -61,6 +61,13 @@ json as_json(const ReportSeries& series) {
             {"points", points}};
 }
 
+json as_json(const PairedComparison& pair) {
+    return {{"better", pair.better},
+            {"worse", pair.worse},
+            {"rel_mse_difference", as_json(pair.difference)},
+            {"decided", pair.decided}};
+}
+
 json as_json(const ReportGeometry& geometry) {
     return {{"method", geometry.method},
             {"resolution", geometry.resolution},
@@ -83,7 +90,8 @@ json as_json(const ReportGeometry& geometry) {
 }  // namespace
 
 json report_json(const Report& report) {
-    json series = json::array(), pareto = json::array(), geometry = json::array(), pictures = json::array();
+    json series = json::array(), pareto = json::array(), paired = json::array(), geometry = json::array(),
+         pictures = json::array();
     for (const ReportSeries& one : report.series) {
         series.push_back(as_json(one));
         for (const ReportPoint& point : one.points) {
@@ -94,6 +102,7 @@ json report_json(const Report& report) {
                               {"rel_mse", number(point.rel_mse.value)}});
         }
     }
+    for (const PairedComparison& one : report.paired) paired.push_back(as_json(one));
     for (const ReportGeometry& one : report.geometry) geometry.push_back(as_json(one));
     for (const ReportPicture& one : report.pictures) {
         pictures.push_back({{"name", one.name}, {"exr", one.exr}});
@@ -126,10 +135,14 @@ json report_json(const Report& report) {
               {"seed", report.reference_seed},
               {"reused", report.reference_reused},
               {"seconds", report.reference_seconds},
+              {"render_seconds",
+               report.reference_render_seconds ? number(*report.reference_render_seconds) : json(nullptr)},
               {"rel_variance", number(report.reference_rel_variance)},
               {"command", report.reference_command}}},
             {"equal_seconds", report.equal_seconds},
             {"verdict", report.verdict},
+            {"winner", report.winner.empty() ? json(nullptr) : json(report.winner)},
+            {"paired", paired},
             {"warnings", report.warnings},
             {"series", series},
             {"pareto", pareto},

@@ -55,11 +55,12 @@ const std::string kSmall = " --size 64x36 --resolutions 32,16 --max-spp 4 --refe
 
 /// What must not depend on the machine's pace or threads: all but times.
 json without_times(json report) {
-    for (const char* key :
-         {"date", "command", "equal_seconds", "verdict", "pareto", "threads", "peak_bytes"}) {
+    for (const char* key : {"date", "command", "equal_seconds", "verdict", "winner", "paired", "pareto",
+                            "threads", "peak_bytes"}) {
         report.erase(key);
     }
     report["reference"].erase("seconds");
+    report["reference"].erase("render_seconds");
     report["reference"].erase("reused");
     for (json& series : report["series"]) {
         for (const char* key : {"seconds", "bake_reused", "bake_recorded", "variance_seconds",
@@ -164,7 +165,20 @@ TEST_F(CompareScene, TellsEveryMethodAtEveryRung) {
         EXPECT_LT(geometry.at("beyond_silhouettes_voxels").at("p99"), 1.0);
         EXPECT_GT(geometry.at("field_mrays"), 0.0);
     }
+    EXPECT_EQ(report.at("reference").at("render_seconds"), report.at("reference").at("seconds"));
     EXPECT_FALSE(report.at("verdict").get<std::string>().empty());
+    // Each two of those that reached the common time: on a busy machine perhaps one alone.
+    EXPECT_LE(report.at("paired").size(), 3u);
+    EXPECT_TRUE(report.at("winner").is_null() || !report.at("paired").empty());
+    for (const json& pair : report.at("paired")) {
+        const json& difference = pair.at("rel_mse_difference");
+        EXPECT_GE(difference.at("value"), 0.0);
+        EXPECT_LE(difference.at("low"), difference.at("value"));
+        EXPECT_GE(difference.at("high"), difference.at("value"));
+        EXPECT_EQ(pair.at("decided"), difference.at("low") > 0.0);
+    }
+    EXPECT_TRUE(report.at("winner").is_null() ||
+                report.at("winner") == report.at("paired").at(0).at("better"));
     EXPECT_FALSE(report.at("pareto").empty());
     const std::string csv = text_of(place_->path("out/report.csv"));
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 9);
@@ -257,10 +271,13 @@ TEST_F(CompareScene, ReusesReferenceAndFieldsAndFindsTheSameOnOneThread) {
     const json report = json::parse(text_of(place_->path("out/report.json")));
     EXPECT_EQ(json::parse(second.out), report) << "--json prints the file";
     EXPECT_EQ(report.at("reference").at("reused"), true);
+    EXPECT_EQ(report.at("reference").at("seconds"), 0.0) << "of this run";
+    EXPECT_EQ(report.at("reference").at("render_seconds"), report_->at("reference").at("seconds"));
     EXPECT_EQ(report.at("threads"), 1);
     EXPECT_EQ(without_times(report), without_times(*report_));
     const std::string page = text_of(place_->path("out/report.html"));
     EXPECT_NE(page.find("which recorded their price"), std::string::npos);
+    EXPECT_NE(page.find(" s in an earlier run, reused"), std::string::npos);
     EXPECT_NE(page.find(report.at("geometry_rays").get<std::string>()), std::string::npos);
     for (std::size_t m = 1; m < kMethods.size(); ++m) {
         const json &before = report_->at("series").at(m), &now = report.at("series").at(m);
@@ -284,6 +301,22 @@ TEST_F(CompareScene, SaysWhereItDoesNotKnowThePriceOfFields) {
     }
     EXPECT_NE(outcome.out.find("not the whole price"), std::string::npos) << outcome.out;
     EXPECT_EQ(without_times(report), without_times(*report_)) << "at any thread count, in another folder";
+}
+
+TEST_F(CompareScene, SaysWhereItDoesNotKnowThePriceOfTheReference) {
+    fs::create_directory(place_->path("unpriced"));
+    fs::copy(place_->path("out/reference"), place_->path("unpriced/reference"), fs::copy_options::recursive);
+    fs::path record = references(place_->path("unpriced/reference")).at(0);
+    record.replace_extension(".json");
+    ASSERT_TRUE(fs::exists(record));
+    std::ofstream(record) << "{\"schema\":1,\"of\":\"another\",\"seconds\":7}";
+    const Outcome outcome =
+        place_->run("fieldlight compare " + kScene + " -o unpriced --bake-dir out/fields" + kSmall);
+    const json report = json::parse(text_of(place_->path("unpriced/report.json")));
+    EXPECT_EQ(report.at("reference").at("reused"), true) << outcome.err;
+    EXPECT_TRUE(report.at("reference").at("render_seconds").is_null());
+    const std::string page = text_of(place_->path("unpriced/report.html"));
+    EXPECT_NE(page.find("which did not record its time"), std::string::npos);
 }
 
 TEST_F(CompareScene, RendersADamagedReferenceAgain) {
