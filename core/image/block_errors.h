@@ -1,5 +1,4 @@
-// core/image/block_errors.h: the error of a picture, summed over blocks of pixels: what intervals are made
-// of.
+// core/image/block_errors.h: a picture's error by blocks of pixels, and the intervals that follow from it.
 //
 // Blocks, not pixels, count as independent, since neighbours may share noise. Two intervals come from them.
 //
@@ -15,7 +14,7 @@
 // distance from it is on average no less than the block's own noise, so that the interval is never too
 // narrow by it. Student's t, degrees of freedom after Satterthwaite, "An Approximate Distribution of
 // Estimates of Variance Components", Biometrics Bulletin 1946: few where a few blocks hold most of the
-// scatter.
+// scatter. What is too rare to have been seen in any block is in neither interval.
 #pragma once
 
 #include <cstddef>
