@@ -80,7 +80,7 @@ fs::path resolve_destination(const fs::path& path) {
     std::error_code error;
     const fs::file_status link = fs::symlink_status(path, error);
     if (!fs::exists(link)) return path;
-    const fs::path target = fs::is_symlink(link) ? fs::canonical(path, error) : path;
+    fs::path target = fs::is_symlink(link) ? fs::canonical(path, error) : path;
     if (error) {
         throw InputError(ErrorKind::kCannotCreate, fmt::format("'{}': cannot write through this link: {}",
                                                                path.string(), error.message()));
@@ -100,7 +100,7 @@ fs::path create_temporary(const fs::path& path, const fs::path& target) {
     while (true) {
         const std::string name = fmt::format(".{}.{}-{}{}", target.stem().string(), ::getpid(), counter++,
                                              target.extension().string());
-        const fs::path temporary = target.parent_path() / name;
+        fs::path temporary = target.parent_path() / name;
         const Descriptor created(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
         if (created.is_open()) return temporary;
         if (errno != EEXIST) fail(path, "create a file in this folder", errno);

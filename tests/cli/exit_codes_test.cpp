@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <ostream>
 #include <string>
 #include <thread>
 
@@ -45,6 +46,10 @@ struct ExitCode {
     std::string message;  ///< What stderr holds; nothing where it must be empty.
     std::string stdout_file = "/dev/null";
 };
+
+void PrintTo(const ExitCode& row, std::ostream* stream) {
+    *stream << row.name;
+}
 
 // 70 is missing: it is for faults of the program, and a command that ended in it would be one. 130 and 143
 // are below.
@@ -123,6 +128,10 @@ struct Interruption {
     std::chrono::milliseconds after;          ///< The start.
     std::vector<std::string> may_exist = {};  ///< Endings of files that were whole before the signal came.
 };
+
+void PrintTo(const Interruption& row, std::ostream* stream) {
+    *stream << row.name;
+}
 
 class Interruptions : public testing::TestWithParam<Interruption> {};
 
