@@ -122,7 +122,8 @@ nlohmann::json report_of(const Comparison& comparison) {
     return report;
 }
 
-void print_table(const Comparison& comparison) {
+std::string table_of(const Comparison& comparison) {
+    std::string text;
     const core::ImageMetrics& metrics = comparison.metrics.image;
     for (const PictureMetric& row : picture_metrics()) {
         const double value = row.value(comparison.metrics);
@@ -130,27 +131,29 @@ void print_table(const Comparison& comparison) {
         const std::string line =
             undefined ? fmt::format("{:<21} {:>12}   not defined: {}", row.label, "-", row.undefined)
                       : fmt::format("{:<21} {:>12.6g}   {}", row.label, value, row.definition);
-        fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+        text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
     }
     if (!std::isnan(comparison.metrics.corrected.value)) {
-        fmt::print("{:<21} {:>12}   {:.6g} to {:.6g}; the reference's noise makes {:.6g}\n",
-                   "  95 % interval", "", comparison.metrics.corrected.low, comparison.metrics.corrected.high,
-                   comparison.reference_noise);
+        text += fmt::format("{:<21} {:>12}   {:.6g} to {:.6g}; the reference's noise makes {:.6g}\n",
+                            "  95 % interval", "", comparison.metrics.corrected.low,
+                            comparison.metrics.corrected.high, comparison.reference_noise);
     }
     const core::FlipResult& flip = comparison.flip;
-    fmt::print(
+    text += fmt::format(
         "{:<21} {:>12.6g}   weighted: half of the error lies in pixels up to this; quartiles {:.6g} and "
         "{:.6g}; "
         "from {:.6g} to {:.6g}\n",
         "FLIP, median", flip.weighted_median, flip.first_quartile, flip.third_quartile, flip.min, flip.max);
     const core::LeakMetric& leak = metrics.leak;
-    fmt::print("{:<21} {:>12.6g}   over {} dark pixels; P99.9 {:.6g}; {}\n", "leak, mean", leak.mean,
-               leak.dark_pixels, leak.p99_9,
-               leak.counts
-                   ? "the lit side is right within 2 %"
-                   : fmt::format("does not count: the lit side is off by {:.3g} %", leak.lit_bias_percent));
-    fmt::print("{:<21} {:>12}   in the test {}, in the reference {}\n", "non-finite pixels",
-               metrics.nonfinite_pixels, metrics.nonfinite_test_pixels, metrics.nonfinite_reference_pixels);
+    text += fmt::format(
+        "{:<21} {:>12.6g}   over {} dark pixels; P99.9 {:.6g}; {}\n", "leak, mean", leak.mean,
+        leak.dark_pixels, leak.p99_9,
+        leak.counts ? "the lit side is right within 2 %"
+                    : fmt::format("does not count: the lit side is off by {:.3g} %", leak.lit_bias_percent));
+    text += fmt::format("{:<21} {:>12}   in the test {}, in the reference {}\n", "non-finite pixels",
+                        metrics.nonfinite_pixels, metrics.nonfinite_test_pixels,
+                        metrics.nonfinite_reference_pixels);
+    return text;
 }
 
 /// Why one number is beyond its threshold, or nothing.
@@ -277,12 +280,14 @@ void compare(const CompareOptions& options, Program& program) {
         nlohmann::json report = report_of(comparison);
         report["failures"] = failures;
         report["warnings"] = warnings;
-        fmt::print("{}\n", report.dump());
+        std::fputs((report.dump() + "\n").c_str(), stdout);
     } else {
-        print_table(comparison);
+        std::fputs(table_of(comparison).c_str(), stdout);
     }
     for (const std::string& warning : warnings) warn(program, warning);
-    for (const std::string& failure : failures) fmt::print(stderr, "fieldlight: failed: {}\n", failure);
+    for (const std::string& failure : failures) {
+        std::fputs(fmt::format("fieldlight: failed: {}\n", failure).c_str(), stderr);
+    }
     if (!warnings.empty()) program.exit_code = kExitWarned;
     if (!failures.empty()) program.exit_code = kExitThresholdFailed;
 }

@@ -376,19 +376,13 @@ TEST_F(CompareScene, EndsTheLadderWithItsBudget) {
     EXPECT_NE(outcome.err.find("--time-budget"), std::string::npos) << outcome.err;
 }
 
-TEST(CompareSceneErrors, EndWithTheCodeOfTheTrouble) {
+TEST(CompareSceneErrors, RefuseWrongFlags) {
     const Workplace place;
-    std::ofstream(place.path("bad.glb")) << "not a scene";
-    std::ofstream(place.path("file")) << "in the way";
     const auto code = [&](const std::string& arguments) {
         const Outcome outcome = place.run("fieldlight compare " + arguments);
         EXPECT_FALSE(outcome.err.empty()) << arguments;
         return outcome.exit_code;
     };
-    EXPECT_EQ(code("none.glb -o out" + kSmall), 66);
-    EXPECT_EQ(code("bad.glb -o out" + kSmall), 65);
-    EXPECT_EQ(code(kScene + " -o file/out" + kSmall), 73);
-    EXPECT_EQ(code(kScene + " -o file" + kSmall), 73);
     EXPECT_EQ(code(kScene + kSmall), 64);
     EXPECT_EQ(code(kScene + " " + kScene + " -o out"), 64);
     for (const char* wrong : {"--resolutions 16,16", "--resolutions 2", "--max-spp 0", "--reference-spp 7",
@@ -400,20 +394,6 @@ TEST(CompareSceneErrors, EndWithTheCodeOfTheTrouble) {
         EXPECT_EQ(code(std::string("a.exr b.exr ") + wrong), 64) << wrong;
     }
     EXPECT_FALSE(fs::exists(place.path("out"))) << "a failed run leaves nothing";
-}
-
-TEST(CompareSceneErrors, LeaveNothingHalfWhenInterrupted) {
-    const Workplace place;
-    const Outcome outcome =
-        place.run("timeout --preserve-status -s INT 2 '" FIELDLIGHT_BINARY "' compare " + kScene +
-                  " -o out --size 640x360 --resolutions 16 --reference-spp 65536");
-    EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
-    if (!fs::exists(place.path("out"))) return;  // On a slow machine the scene was not even loaded.
-    for (const auto& entry : fs::recursive_directory_iterator(place.path("out"))) {
-        if (!entry.is_regular_file()) continue;
-        const std::string name = entry.path().filename().string();
-        EXPECT_TRUE(name.ends_with(".vdb") || name == "bake_seconds.json") << name;
-    }
 }
 
 }  // namespace
