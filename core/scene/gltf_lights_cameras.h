@@ -12,7 +12,7 @@ namespace core {
 
 /// A camera at a node, without the node's scale. It is named after the node, or else after the camera.
 /// @throws InputError for a field of view or magnification that shows nothing.
-Camera read_camera(const JsonElement& camera, const JsonElement& node, const glm::dmat4& world_from_node);
+Camera read_camera(const JsonElement& element, const JsonElement& node, const glm::dmat4& world_from_node);
 
 /// The light that a node's KHR_lights_punctual refers to. It shines along the node's -Z. Nothing, with a
 /// warning, for a type that the extension does not know.

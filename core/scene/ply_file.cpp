@@ -116,9 +116,10 @@ public:
         }
         // The last value of a text needs nothing after it.
         const std::uint64_t left = bytes_left() + (format_ == PlyFormat::kText ? 1 : 0);
-        if (element.count <= left / row_bytes) return;
+        const std::uint64_t most = left / std::max<std::uint64_t>(row_bytes, 1);
+        if (element.count <= most) return;
         fail(fmt::format("there are {} of it by the header, but the {} bytes that are left hold at most {}",
-                         element.count, bytes_left(), left / row_bytes));
+                         element.count, bytes_left(), most));
     }
 
     double number(const PlyProperty& property) { return read(property.type, property); }
@@ -127,7 +128,8 @@ public:
         const double length = read(property.count_type, property);
         if (length < 0.0) fail(fmt::format("'{}' has {} entries", quotable(property.name), length));
         const std::uint64_t entry_bytes = format_ == PlyFormat::kText ? 2 : byte_count(property.type);
-        if (length > static_cast<double>((bytes_left() + 1) / entry_bytes)) {
+        const std::uint64_t most = (bytes_left() + 1) / entry_bytes;
+        if (length > static_cast<double>(most)) {
             fail(fmt::format("'{}' has {} entries, but {} bytes are left", quotable(property.name), length,
                              bytes_left()));
         }

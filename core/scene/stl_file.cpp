@@ -102,8 +102,8 @@ public:
         std::size_t facet_count = 0;
         for (std::string_view word = scanner_.word(); !word.empty(); word = scanner_.word()) {
             if (lower_case(word) != "solid") fail(word, "solid");
-            std::string name(scanner_.rest_of_line());
-            Solid solid(name.empty() ? default_name : std::move(name), file_name_);
+            const std::string name(scanner_.rest_of_line());
+            Solid solid(name.empty() ? default_name : name, file_name_);
             read_facets(solid, facet_count);
             if (solid.facet_count() > 0) solid.place(scene);
         }
