@@ -14,7 +14,6 @@
 #include "core/scene/scene.h"
 #include "core/trace/tracer.h"
 #include "sdf/brick_grid.h"
-#include "sdf/cell_triangles.h"
 #include "sdf/entry_kernel.h"
 #include "sdf/field_table.h"
 #include "sdf/instance_tree.h"
@@ -65,6 +64,7 @@ public:
         glm::dvec3 voxel_origin{0.0};               ///< Voxel coordinates of the world's origin.
         double world_from_voxel_scale = 1.0;        ///< Largest stretch of one voxel, in world units.
         float start_offset = 0.0f;
+        bool is_opaque = false;        ///< No shells and no alpha.
         bool is_opaque_solid = false;  ///< Every crossing is a visible surface.
     };
 
@@ -72,6 +72,7 @@ private:
     struct LocalRay;
     struct Nearest;
     struct Passage;
+    struct Surface;
     struct Traced;
     struct Work;
 
@@ -84,16 +85,20 @@ private:
     void enter_next_instances(Work& work) const;
     /// Takes all active rays through the field that each has come to.
     void march_active(bool any, Work& work) const;
-    /// Takes what the kernels found, as number `at` of `met`, in a field without thickened features.
-    void finish_plain(const Work& work, std::size_t at, Traced& traced) const;
-    /// The same for fields with such features, whose triangles decide.
-    void finish_thickened(const core::Ray& ray, const MarchHit& march_hit, Traced& traced) const;
+    /// Takes the crossing that the kernels found, number `at` of work.met, and looks on if it is none.
+    void finish_crossing(const Work& work, std::size_t at, Traced& traced) const;
+    /// The end of a passage where thickened features are and the kernel found nothing.
+    void finish_without_crossing(const core::Ray& ray, Traced& traced) const;
     /// Looks for the first visible surface without a kernel, from crossing to crossing.
     void walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const;
     LocalRay local_ray(const core::Ray& ray, const Traced& traced) const;
     void keep_nearer(const Nearest& found, Traced& traced) const;
-    /// Finds the triangle of a crossing; false where there is no visible surface.
-    bool resolve(LocalRay& ray, const Crossing& crossing, Nearest& found) const;
+    /// Whether a crossing is a visible surface, and which.
+    bool accept(LocalRay& ray, const Crossing& crossing, const Surface& here, Nearest& found) const;
+    Surface surface_at(const LocalRay& ray, const Crossing& crossing) const;
+    Surface surface_found(const Work& work, std::size_t at, std::int32_t triangle_base) const;
+    /// Where the ray ends within a shell.
+    void meet_shell_at_end(LocalRay& local, double t_max, Nearest& found) const;
     /// Finds the first visible triangle that the ray truly meets in [t_min, t_max].
     bool meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const;
     /// The normal that faces the ray: of the triangle itself, or of the field.

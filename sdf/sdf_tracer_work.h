@@ -1,0 +1,103 @@
+// sdf/sdf_tracer_work.h: what SdfTracer keeps of rays while it traces them. For its own sources alone.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <vector>
+
+#include "core/math/ray.h"
+#include "core/scene/scene.h"
+#include "sdf/entry_kernel.h"
+#include "sdf/instance_tree.h"
+#include "sdf/sdf_tracer.h"
+#include "sdf/surface_kernel.h"
+
+namespace sdf {
+
+/// How far off a solid's surface rays start that leave it. The solver's own error is far smaller; this clears
+/// the facets of the trilinear surface, which rise 1 / 8r over the smooth surface that the normal belongs to,
+/// r its radius in voxels.
+inline constexpr double kSurfaceClearanceVoxels = 0.05;
+
+/// Four units in the last place of a float of this magnitude.
+inline double four_ulp(double magnitude) {
+    return 4.0 * magnitude * static_cast<double>(std::numeric_limits<float>::epsilon());
+}
+
+/// A ray in an instance's voxels, and what it has met there so far.
+struct SdfTracer::LocalRay {
+    const core::Ray& world;
+    std::uint32_t instance;
+    const PlacedGrid& placed;
+    const core::Mesh& mesh;
+    glm::dvec3 origin;     ///< Voxel coordinates.
+    glm::dvec3 direction;  ///< Voxels a world unit.
+    double t_max;          ///< The nearest hit of other instances, or the ray's own end.
+    double unmet_since;    ///< No visible triangle is met before; at first the ray's start.
+    bool is_inside;        ///< Whether the field is negative where the walk has come to.
+};
+
+/// The nearest visible crossing so far.
+struct SdfTracer::Nearest {
+    double t = 0.0;  ///< Until there is one: t_max.
+    std::uint32_t instance = core::kNoIndex;
+    std::uint32_t triangle = core::kNoIndex;
+    glm::vec2 barycentrics{0.0f};
+    glm::vec3 gradient{0.0f};  ///< Of the field, in voxels, where not is_triangle.
+    bool enters_negative = true;
+    bool is_front = true;
+    bool is_triangle = false;  ///< The ray meets the triangle itself, not the field that stands for it.
+
+    bool found() const { return instance != core::kNoIndex; }
+};
+
+/// A ray's way through the box of one instance's field.
+struct SdfTracer::Passage {
+    std::uint32_t instance = core::kNoIndex;
+    double t_min = 0.0, t_max = 0.0;
+    double t_per_voxel = 1.0;
+
+    double t_at(const MarchHit& march_hit) const { return t_min + march_hit.distance * t_per_voxel; }
+};
+
+/// A ray on its way through the scene.
+struct SdfTracer::Traced {
+    Nearest nearest;
+    Passage passage;
+    std::uint32_t steps = 0;
+    bool is_exhausted = false;
+};
+
+/// Rays that are traced together: enough to keep the lanes of a kernel busy, few enough for the cache.
+inline constexpr std::size_t kBlockRays = 2048;
+
+/// The memory of a block of rays.
+struct SdfTracer::Work {
+    const core::RayStream* rays = nullptr;
+    std::size_t first_ray = 0;  ///< Of the block.
+    std::vector<std::uint8_t> valid = std::vector<std::uint8_t>(kBlockRays);
+    std::vector<Traced> traced{kBlockRays};
+    std::vector<InstanceTree::Walk> walks{kBlockRays};  ///< Of the same rays.
+    std::vector<std::uint32_t> leaving;                 ///< Rays that go on to their next instance.
+    Entries entries{kBlockRays};
+    std::vector<std::uint32_t> active;             ///< Rays that are within a field's box.
+    std::vector<MarchRay> march_rays{kBlockRays};  ///< Of the active rays.
+    std::vector<MarchHit> march_hits{kBlockRays};
+    std::vector<std::uint32_t> met;  ///< Entries of `active` whose crossing is looked up in `surface`.
+    SurfacePoints surface;
+
+    core::Ray ray(std::uint32_t slot) const { return rays->get(first_ray + slot); }
+};
+
+/// What lies at a crossing: the closest of the triangles that its cell names.
+struct SdfTracer::Surface {
+    std::uint32_t triangle = kNoTriangle;
+    double distance = 0.0;  ///< From the crossing, voxels.
+    glm::vec2 barycentrics{0.0f};
+    glm::vec3 scaled_normal{0.0f};  ///< Of the triangle; voxels.
+    glm::vec3 gradient{0.0f};       ///< Of the field.
+};
+
+}  // namespace sdf
