@@ -344,8 +344,9 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
         const Floats at = hn::Floor(hn::Load(kFloat, origin) + next * hn::Load(kFloat, direction));
         const Floats region = hn::IfThenElse(hn::Or(whole_block, jumps), block, cell);
         const Floats low = hn::IfThenZeroElse(jumps_far, region);
+        // The last block may reach beyond the field.
         const Floats last =
-            hn::IfThenElse(jumps_far, count, region + hn::IfThenElse(jumps, seven, size)) - one;
+            hn::Min(count, hn::IfThenElse(jumps_far, count, region + hn::IfThenElse(jumps, seven, size))) - one;
         const Floats inside = hn::Min(hn::Max(at, low), last);
         return hn::IfThenElse(across, region + (hn::Load(kFloat, up) * (size + one) - one), inside);
     };
