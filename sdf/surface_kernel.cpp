@@ -80,7 +80,7 @@ constexpr int kCornerSample[] = {0, 1, 8, 9, 64, 65, 72, 73};
 
 HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
     const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f);
-    const Ints none = hn::Set(kInt, -1);
+    const Ints none = hn::Set(kInt, -1), no_entry = hn::Set(kInt, 0xffff);
     const auto* entries = reinterpret_cast<const std::int32_t*>(table.palette_entries);
     const auto* triangles = reinterpret_cast<const float*>(table.triangles);
     for (std::size_t i = 0; i < points.size(); i += hn::Lanes(kFloat)) {
@@ -95,8 +95,7 @@ HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
         const Ints palette_first = hn::GatherIndex(kInt, table.palette_first, brick);
 
         Vector gradient{zero, zero, zero};
-        Floats best_u = zero, best_v = zero, best_squared = hn::Set(kFloat, 1e30f);
-        Ints best_triangle = none, last_entry = none;
+        Ints entries_of[8];  // Of the corners.
         for (int corner = 0; corner < 8; ++corner) {
             const Ints sample = first + hn::Set(kInt, kCornerSample[corner]);
             const Floats weight = (corner & 4 ? fx : gx) * (corner & 2 ? fy : gy) * (corner & 1 ? fz : gz);
@@ -106,12 +105,24 @@ HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
                 gradient.y + weight * hn::ConvertTo(kFloat, hn::ShiftRight<22>(hn::ShiftLeft<10>(packed)));
             gradient.z =
                 gradient.z + weight * hn::ConvertTo(kFloat, hn::ShiftRight<22>(hn::ShiftLeft<20>(packed)));
+            if (corner & 1) continue;
+            // Two entries along z in a word.
+            const Ints pair = hn::GatherOffset(kInt, entries, hn::ShiftLeft<1>(sample));
+            entries_of[corner] = hn::And(pair, no_entry);
+            entries_of[corner + 1] = hn::And(hn::ShiftRight<16>(pair), no_entry);
+        }
 
-            const Ints entry =
-                hn::And(hn::GatherOffset(kInt, entries, hn::ShiftLeft<1>(sample)), hn::Set(kInt, 0xffff));
-            const auto named = hn::And(hn::Ne(entry, hn::Set(kInt, 0xffff)), hn::Ne(entry, last_entry));
-            if (hn::AllFalse(kInt, named)) continue;
-            last_entry = hn::IfThenElse(named, entry, last_entry);
+        // Every distinct triangle once, in ascending order: of equally close ones the first stays.
+        Floats best_u = zero, best_v = zero, best_squared = hn::Set(kFloat, 1e30f);
+        Ints best_triangle = none, entry = none;
+        for (;;) {
+            Ints next = no_entry;
+            for (const Ints other : entries_of) {
+                next = hn::IfThenElse(hn::And(hn::Gt(other, entry), hn::Lt(other, next)), other, next);
+            }
+            entry = next;
+            const auto named = hn::Lt(entry, no_entry);
+            if (hn::AllFalse(kInt, named)) break;
             const Ints triangle =
                 hn::GatherIndex(kInt, table.palettes, hn::IfThenElseZero(named, palette_first + entry));
             // Nine floats a triangle.
@@ -122,10 +133,7 @@ HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
             const Vector from{p.x - component(0), p.y - component(1), p.z - component(2)};
             const ClosestLanes found = closest_on_triangles(from, {component(3), component(4), component(5)},
                                                             {component(6), component(7), component(8)});
-            const auto tie = hn::And(hn::RebindMask(kInt, hn::Eq(found.squared, best_squared)),
-                                     hn::Lt(triangle, best_triangle));
-            const auto nearer =
-                hn::And(named, hn::Or(hn::RebindMask(kInt, hn::Lt(found.squared, best_squared)), tie));
+            const auto nearer = hn::And(named, hn::RebindMask(kInt, hn::Lt(found.squared, best_squared)));
             const auto nearer_float = hn::RebindMask(kFloat, nearer);
             best_triangle = hn::IfThenElse(nearer, triangle, best_triangle);
             best_u = hn::IfThenElse(nearer_float, found.u, best_u);
