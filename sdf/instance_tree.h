@@ -1,4 +1,7 @@
 // sdf/instance_tree.h: a bounding volume hierarchy over the world boxes of instances.
+//
+// Eight children a node, so that one test of a ray against all of them fills a vector. Boxes are single
+// precision, rounded outwards; what they let through is clipped exactly later, in each field's own space.
 #pragma once
 
 #include <cstddef>
@@ -12,60 +15,55 @@
 
 namespace sdf {
 
-/// A binary tree, walked front to back with pruning at the nearest hit so far.
+/// Walked front to back with pruning at the nearest hit so far.
 class InstanceTree {
 public:
-    /// The median splits of 2^32 instances end at depth 32.
-    static constexpr int kMaxDepth = 34;
+    static constexpr std::size_t kWidth = 8;
+    /// Children that wait at most, whatever the tree: the constructor sees to it.
+    static constexpr std::size_t kStackSize = 96;
+
+    struct alignas(64) Node {
+        float low[3][kWidth], high[3][kWidth];
+        std::int32_t child[kWidth];  ///< Node numbers, or ~instance.
+        std::uint32_t used;          ///< One bit a child that there is.
+    };
 
     /// One box an instance; empty boxes are never visited.
     InstanceTree() = default;
     explicit InstanceTree(std::span<const core::DoubleBounds> boxes);
 
-    /// A walk along one ray: the instances whose box it meets, near boxes first as far as the tree can tell.
+    /// A walk along one ray: the instances whose box it meets, by the distance at which it enters them.
     class Walk {
     public:
         /// @param limit beyond which nothing counts
-        void start(const InstanceTree& tree, const glm::dvec3& origin, const glm::dvec3& direction,
-                   double t_min, double limit);
+        void start(const InstanceTree& tree, const core::Ray& ray, double limit);
 
         /// The next instance whose box begins before `limit`, which may shrink from call to call; false once
         /// there is none.
         bool next(double limit, std::uint32_t& instance);
 
-    private:
         struct Entry {
-            double t;
-            std::uint32_t node;
+            float t;
+            std::int32_t child;
         };
-        bool entry_distance(std::uint32_t node, double limit, double& t) const;
-        void push(std::uint32_t node, double t) { stack_[depth_++] = {t, node}; }
-
-        const InstanceTree* tree_ = nullptr;
-        glm::dvec3 origin_{0.0}, inverse_{0.0};
-        double t_min_ = 0.0;
-        std::uint32_t leaf_next_ = 0, leaf_end_ = 0;  ///< What is left of the last leaf.
-        int depth_ = 0;
-        Entry stack_[kMaxDepth];
+        const Node* nodes = nullptr;
+        float origin[3], inverse[3], t_min;
+        std::int32_t depth = 0;
+        Entry stack[kStackSize];
     };
+
+    /// next() for many walks: of walks[slots[i]] before limits[i]; kNoIndex where there is none.
+    static void find_next(std::span<Walk> walks, std::span<const std::uint32_t> slots, const double* limits,
+                          std::uint32_t* instances);
 
     /// The instance, if exactly one can be met; kNoIndex else.
-    std::uint32_t only_instance() const { return order_.size() == 1 ? order_[0] : core::kNoIndex; }
+    std::uint32_t only_instance() const { return only_instance_; }
 
-    std::size_t bytes() const { return nodes_.size() * sizeof(Node) + order_.size() * sizeof(order_[0]); }
+    std::size_t bytes() const { return nodes_.capacity() * sizeof(Node); }
 
 private:
-    struct Node {
-        core::DoubleBounds box;
-        std::uint32_t first = 0;  ///< Leaf: first entry of order_. Inner: index of the second child.
-        std::uint32_t count = 0;  ///< Leaf: number of entries. Inner: 0; the first child follows the node.
-    };
-    static constexpr std::uint32_t kLeafSize = 2;
-
-    void build(std::span<const core::DoubleBounds> boxes, std::uint32_t begin, std::uint32_t end);
-
     std::vector<Node> nodes_;
-    std::vector<std::uint32_t> order_;
+    std::uint32_t only_instance_ = core::kNoIndex;
 };
 
 /// 1 / direction with something finite in place of infinity, so that a ray in the face of a box (0 times the

@@ -106,15 +106,22 @@ void SdfTracer::enter_next_instances(Work& work) const {
     work.active.clear();
     Entries& entries = work.entries;
     while (!work.leaving.empty()) {
+        for (std::size_t i = 0; i < work.leaving.size(); ++i) {
+            work.limits[i] = work.traced[work.leaving[i]].nearest.t;
+        }
+        if (only_instance_ == core::kNoIndex) {
+            InstanceTree::find_next(work.walks, work.leaving, work.limits.data(), work.next_instances.data());
+        }
         // Those without another instance drop out.
         std::size_t count = 0;
-        for (const std::uint32_t slot : work.leaving) {
-            std::uint32_t instance = only_instance_;
-            const double limit = work.traced[slot].nearest.t;
-            if (instance == core::kNoIndex && !work.walks[slot].next(limit, instance)) continue;
+        for (std::size_t i = 0; i < work.leaving.size(); ++i) {
+            const std::uint32_t slot = work.leaving[i];
+            const std::uint32_t instance =
+                only_instance_ != core::kNoIndex ? only_instance_ : work.next_instances[i];
+            if (instance == core::kNoIndex) continue;
             entries.ray[count] = static_cast<std::int32_t>(work.first_ray + slot);
             entries.instance[count] = static_cast<std::int32_t>(instance);
-            entries.limit[count] = limit;
+            entries.limit[count] = work.limits[i];
             work.leaving[count++] = slot;
         }
         if (count > 0) {
@@ -184,9 +191,7 @@ void SdfTracer::trace_block(std::size_t begin, std::size_t end, bool any, Work& 
         if (!work.valid[slot]) continue;
         traced.nearest.t = rays.t_max[i];
         if (!is_one_instance) {
-            const core::Ray ray = rays.get(i);
-            work.walks[slot].start(tree_, glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min,
-                                   ray.t_max);
+            work.walks[slot].start(tree_, rays.get(i), traced.nearest.t);
         }
         work.leaving.push_back(static_cast<std::uint32_t>(slot));
     }

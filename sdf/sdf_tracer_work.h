@@ -81,6 +81,8 @@ struct SdfTracer::Work {
     std::vector<Traced> traced{kBlockRays};
     std::vector<InstanceTree::Walk> walks{kBlockRays};  ///< Of the same rays.
     std::vector<std::uint32_t> leaving;                 ///< Rays that go on to their next instance.
+    std::vector<double> limits = std::vector<double>(kBlockRays);  ///< Of those.
+    std::vector<std::uint32_t> next_instances = std::vector<std::uint32_t>(kBlockRays);
     Entries entries{kBlockRays};
     std::vector<std::uint32_t> active;             ///< Rays that are within a field's box.
     std::vector<MarchRay> march_rays{kBlockRays};  ///< Of the active rays.

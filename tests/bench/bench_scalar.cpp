@@ -37,7 +37,7 @@ ScalarFieldTracer::Nearest ScalarFieldTracer::first_crossing(const core::Ray& ra
     Nearest nearest;
     nearest.t = ray.t_max;
     sdf::InstanceTree::Walk walk;
-    walk.start(tree_, glm::dvec3(ray.origin), glm::dvec3(ray.direction), ray.t_min, nearest.t);
+    walk.start(tree_, ray, nearest.t);
     std::uint32_t instance = 0;
     while (walk.next(nearest.t, instance)) {
         const Placed& placed = placed_[instance];
