@@ -70,7 +70,10 @@ extern "C" int checked_posix_memalign(void** memory, std::size_t alignment,
 
 extern "C" int checked_posix_memalign(void** memory, std::size_t alignment, std::size_t bytes) {
     if (alignment == 0 || (alignment & (alignment - 1)) != 0 || alignment % sizeof(void*) != 0) return EINVAL;
-    void* const taken = std::aligned_alloc(alignment, bytes);
+    // aligned_alloc takes whole multiples of the alignment; clang's sanitizer insists on it.
+    const bool fits = bytes <= std::numeric_limits<std::size_t>::max() - alignment;
+    void* const taken =
+        fits ? std::aligned_alloc(alignment, (bytes + alignment - 1) & ~(alignment - 1)) : nullptr;
     if (!taken && aligned_memory_is_checked) throw std::bad_alloc();
     if (!taken) return ENOMEM;
     *memory = taken;
