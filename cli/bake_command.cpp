@@ -102,7 +102,7 @@ void throw_failures(const sdf::BakeResult& result) {
     if (!messages.empty()) throw core::InputError(kind, messages);
 }
 
-void bake(Program& program, const BakeOptions& options) {
+void bake(const Program& program, const BakeOptions& options) {
     sdf::BakeSettings settings = options.settings;
     if (options.voxel_option->count() > 0) settings.voxel_world = options.voxel;
     settings.surface_class = class_names().at(options.surface_class);
@@ -114,10 +114,7 @@ void bake(Program& program, const BakeOptions& options) {
     const core::StopRequested stop = stop_flag();
     const sdf::BakeResult result =
         sdf::bake_scene(scene, settings, options.output, make_progress(program), stop);
-    if (stop && stop()) {
-        program.exit_code = stop_exit_code();
-        return;
-    }
+    if (stop()) throw core::Interrupted();
     if (result.meshes.empty()) {
         warn(program, fmt::format("'{}': has no triangles, so no field was written", scene.name));
     }

@@ -15,6 +15,7 @@
 #include "cli/compare_scene_flags.h"
 #include "cli/options.h"
 #include "cli/picture_file.h"
+#include "cli/picture_metrics.h"
 #include "core/image/error_estimate.h"
 #include "core/image/flip.h"
 #include "core/image/metrics.h"
@@ -30,77 +31,21 @@ namespace {
 constexpr int kExitWarned = 1, kExitThresholdFailed = 2;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Everything that is measured of two pictures. What is not defined is NaN.
+/// Everything that is measured of two pictures.
 struct Comparison {
-    core::ImageMetrics metrics;
+    PictureMetrics metrics;
     core::FlipResult flip;
-    double flip_ldr = kNaN;  ///< Only where all values lie in [0, 1].
-    double ssim = kNaN;
-    core::ErrorInterval corrected{kNaN, kNaN, kNaN};  ///< Only where the reference brings its variance.
-    double reference_noise = kNaN;                    ///< relMSE that the reference's variance makes.
+    double reference_noise = kNaN;  ///< relMSE that the reference's variance makes; as metrics.corrected.
     bool black_reference = false;
 };
-
-/// When a number is beyond its threshold.
-enum class Limit {
-    kSize,      ///< Where its absolute value is larger.
-    kUpperEnd,  ///< Where the upper end of its interval is larger.
-    kSmallest,  ///< Where it is smaller.
-};
-
-/// One number of the comparison: where it stands in the JSON, how it is shown, and the flag that limits it.
-struct Row {
-    const char* key;   ///< Of the JSON, `percentiles` apart.
-    const char* flag;  ///< Its threshold.
-    const char* label;
-    const char* definition;
-    double (*value)(const Comparison&);
-    Limit limit = Limit::kSize;
-    const char* undefined = nullptr;  ///< Why there may be none, in finite pictures.
-};
-
-const Row kRows[] = {
-    {"mse", "--fail-mse", "MSE", "mean (I - R)^2", [](const Comparison& c) { return c.metrics.mse; }},
-    {"rel_mse", "--fail-rel-mse", "relMSE", "mean (I - R)^2 / (R^2 + 0.01)",
-     [](const Comparison& c) { return c.metrics.rel_mse; }},
-    {"rel_mse_trimmed", "--fail-rel-mse-trimmed", "relMSE, trimmed", "without the worst 0.1 % of the pixels",
-     [](const Comparison& c) { return c.metrics.rel_mse_trimmed; }},
-    {"mrse", "--fail-mrse", "MRSE", "mean (I - R)^2 / (R + 0.01)^2, as pbrt",
-     [](const Comparison& c) { return c.metrics.mrse; }},
-    {"mape", "--fail-mape", "MAPE", "mean |I - R| / (R + 0.01)",
-     [](const Comparison& c) { return c.metrics.mape; }},
-    {"smape", "--fail-smape", "SMAPE", "mean |I - R| / (|I| + |R| + 0.01)",
-     [](const Comparison& c) { return c.metrics.smape; }},
-    {"50", "--fail-p50", "relative error P50", "of |Y_I - Y_R| / (Y_R + 0.01) over the pixels",
-     [](const Comparison& c) { return c.metrics.p50; }},
-    {"95", "--fail-p95", "relative error P95", "", [](const Comparison& c) { return c.metrics.p95; }},
-    {"99", "--fail-p99", "relative error P99", "", [](const Comparison& c) { return c.metrics.p99; }},
-    {"99.9", "--fail-p99.9", "relative error P99.9", "", [](const Comparison& c) { return c.metrics.p99_9; }},
-    {"max", "--fail-max", "relative error, max", "", [](const Comparison& c) { return c.metrics.max; }},
-    {"energy_bias", "--fail-energy-bias", "energy bias, %", "100 (sum Y_I / sum Y_R - 1)",
-     [](const Comparison& c) { return c.metrics.energy_bias_percent; }, Limit::kSize,
-     "the reference is black"},
-    {"leak", "--fail-leak", "leak", "sum max(Y_I - Y_R, 0) where R is dark / sum Y_R",
-     [](const Comparison& c) { return c.metrics.leak.energy_fraction; }, Limit::kSize,
-     "the reference is black"},
-    {"flip", "--fail-flip", "FLIP", "mean HDR FLIP, ACES, 67 pixels a degree",
-     [](const Comparison& c) { return c.flip.mean; }},
-    {"flip_ldr", "--fail-flip-ldr", "FLIP, LDR", "mean LDR FLIP of linear values in [0, 1]",
-     [](const Comparison& c) { return c.flip_ldr; }, Limit::kSize, "a value lies outside [0, 1]"},
-    {"ssim", "--fail-ssim", "SSIM", "mean, 11 x 11, sigma 1.5; R's automatic exposure, ACES, sRGB luma",
-     [](const Comparison& c) { return c.ssim; }, Limit::kSmallest},
-    {"rel_mse_corrected", "--fail-rel-mse-corrected", "relMSE, corrected",
-     "without the reference's own noise", [](const Comparison& c) { return c.corrected.value; },
-     Limit::kUpperEnd, "the reference has no Variance.R, .G, .B"},
-};
-constexpr std::size_t kFirstPercentile = 6, kLastPercentile = 9;
 
 struct CompareOptions {
     std::vector<std::string> inputs;
     std::string layer;
     std::string flip_map;
     CompareSceneFlags scene;
-    std::optional<double> limits[std::size(kRows)];
+    /// In the order of picture_metrics(). Not in braces, which would hold one limit.
+    std::vector<std::optional<double>> limits = std::vector<std::optional<double>>(picture_metrics().size());
 };
 
 [[noreturn]] void fail(const std::string& message) {
@@ -111,8 +56,9 @@ void check_scene(const CompareOptions& options) {
     if (options.inputs.size() != 1) fail("compare SCENE: takes one scene and nothing else");
     if (!options.layer.empty()) fail("compare: --layer belongs to two pictures");
     if (!options.flip_map.empty()) fail("compare: --flip-map belongs to two pictures");
-    for (std::size_t i = 0; i < std::size(kRows); ++i) {
-        if (options.limits[i]) fail(fmt::format("compare: {} belongs to two pictures", kRows[i].flag));
+    for (std::size_t i = 0; i < options.limits.size(); ++i) {
+        if (!options.limits[i]) continue;
+        fail(fmt::format("compare: {} belongs to two pictures", picture_metrics()[i].flag));
     }
 }
 
@@ -135,15 +81,17 @@ void check_pictures(const CompareOptions& options) {
 Comparison measure(const CompareOptions& options, const PictureLayer& test, const PictureLayer& reference) {
     const int width = test.image.width(), height = test.image.height();
     Comparison comparison;
-    comparison.metrics = core::compare_images(test.radiance, reference.radiance);
+    PictureMetrics& metrics = comparison.metrics;
+    metrics.image = core::compare_images(test.radiance, reference.radiance);
     comparison.flip = core::flip_hdr(test.radiance, reference.radiance, width, height);
+    metrics.flip = comparison.flip.mean;
     if (core::is_low_dynamic_range(test.radiance) && core::is_low_dynamic_range(reference.radiance)) {
-        comparison.flip_ldr = core::flip_ldr(test.radiance, reference.radiance, width, height).mean;
+        metrics.flip_ldr = core::flip_ldr(test.radiance, reference.radiance, width, height).mean;
     }
-    comparison.ssim = core::ssim(test.radiance, reference.radiance, width, height);
+    metrics.ssim = core::ssim(test.radiance, reference.radiance, width, height);
     // The variance belongs to the beauty.
     if (options.layer.empty() && reference.image.color("Variance")) {
-        comparison.corrected = core::corrected_rel_mse(test.image, reference.image);
+        metrics.corrected = core::corrected_rel_mse(test.image, reference.image);
         comparison.reference_noise = core::noise_rel_mse(reference.image);
     }
     comparison.black_reference =
@@ -153,12 +101,9 @@ Comparison measure(const CompareOptions& options, const PictureLayer& test, cons
 }
 
 nlohmann::json report_of(const Comparison& comparison) {
-    nlohmann::json report = {{"schema", 1}, {"percentiles", nlohmann::json::object()}};
-    for (std::size_t i = 0; i < std::size(kRows); ++i) {
-        const bool percentile = i >= kFirstPercentile && i <= kLastPercentile;
-        (percentile ? report["percentiles"] : report)[kRows[i].key] = kRows[i].value(comparison);
-    }
-    const core::LeakMetric& leak = comparison.metrics.leak;
+    nlohmann::json report = metrics_json(comparison.metrics, true);
+    report["schema"] = 1;
+    const core::LeakMetric& leak = comparison.metrics.image.leak;
     report["leak_details"] = {{"mean", leak.mean},
                               {"p99.9", leak.p99_9},
                               {"dark_pixels", leak.dark_pixels},
@@ -171,47 +116,50 @@ nlohmann::json report_of(const Comparison& comparison) {
                               {"min", flip.min},
                               {"max", flip.max},
                               {"exposures", flip.exposures}};
-    report["rel_mse_corrected_details"] = {{"low", comparison.corrected.low},
-                                           {"high", comparison.corrected.high},
+    report["rel_mse_corrected_details"] = {{"low", comparison.metrics.corrected.low},
+                                           {"high", comparison.metrics.corrected.high},
                                            {"reference_noise", comparison.reference_noise}};
-    report["nonfinite_pixels"] = comparison.metrics.nonfinite_pixels;
     return report;
 }
 
-void print_table(const Comparison& comparison) {
-    const core::ImageMetrics& metrics = comparison.metrics;
-    for (const Row& row : kRows) {
-        const double value = row.value(comparison);
+std::string table_of(const Comparison& comparison) {
+    std::string text;
+    const core::ImageMetrics& metrics = comparison.metrics.image;
+    for (const PictureMetric& row : picture_metrics()) {
+        const double value = row.value(comparison.metrics);
         const bool undefined = std::isnan(value) && metrics.nonfinite_pixels == 0 && row.undefined;
         const std::string line =
             undefined ? fmt::format("{:<21} {:>12}   not defined: {}", row.label, "-", row.undefined)
                       : fmt::format("{:<21} {:>12.6g}   {}", row.label, value, row.definition);
-        fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+        text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
     }
-    if (!std::isnan(comparison.corrected.value)) {
-        fmt::print("{:<21} {:>12}   {:.6g} to {:.6g}; the reference's noise makes {:.6g}\n",
-                   "  95 % interval", "", comparison.corrected.low, comparison.corrected.high,
-                   comparison.reference_noise);
+    if (!std::isnan(comparison.metrics.corrected.value)) {
+        text += fmt::format("{:<21} {:>12}   {:.6g} to {:.6g}; the reference's noise makes {:.6g}\n",
+                            "  95 % interval", "", comparison.metrics.corrected.low,
+                            comparison.metrics.corrected.high, comparison.reference_noise);
     }
     const core::FlipResult& flip = comparison.flip;
-    fmt::print(
+    text += fmt::format(
         "{:<21} {:>12.6g}   weighted: half of the error lies in pixels up to this; quartiles {:.6g} and "
         "{:.6g}; "
         "from {:.6g} to {:.6g}\n",
         "FLIP, median", flip.weighted_median, flip.first_quartile, flip.third_quartile, flip.min, flip.max);
     const core::LeakMetric& leak = metrics.leak;
-    fmt::print("{:<21} {:>12.6g}   over {} dark pixels; P99.9 {:.6g}; {}\n", "leak, mean", leak.mean,
-               leak.dark_pixels, leak.p99_9,
-               leak.counts
-                   ? "the lit side is right within 2 %"
-                   : fmt::format("does not count: the lit side is off by {:.3g} %", leak.lit_bias_percent));
-    fmt::print("{:<21} {:>12}   in the test {}, in the reference {}\n", "non-finite pixels",
-               metrics.nonfinite_pixels, metrics.nonfinite_test_pixels, metrics.nonfinite_reference_pixels);
+    text += fmt::format(
+        "{:<21} {:>12.6g}   over {} dark pixels; P99.9 {:.6g}; {}\n", "leak, mean", leak.mean,
+        leak.dark_pixels, leak.p99_9,
+        leak.counts ? "the lit side is right within 2 %"
+                    : fmt::format("does not count: the lit side is off by {:.3g} %", leak.lit_bias_percent));
+    text += fmt::format("{:<21} {:>12}   in the test {}, in the reference {}\n", "non-finite pixels",
+                        metrics.nonfinite_pixels, metrics.nonfinite_test_pixels,
+                        metrics.nonfinite_reference_pixels);
+    return text;
 }
 
 /// Why one number is beyond its threshold, or nothing.
-std::optional<std::string> failure_of(const Row& row, double threshold, const Comparison& comparison) {
-    const double value = row.value(comparison);
+std::optional<std::string> failure_of(const PictureMetric& row, double threshold,
+                                      const Comparison& comparison) {
+    const double value = row.value(comparison.metrics);
     if (std::isnan(value) && row.undefined) {
         return fmt::format("{} is not defined, since {}; {} cannot hold", row.label, row.undefined, row.flag);
     }
@@ -221,14 +169,14 @@ std::optional<std::string> failure_of(const Row& row, double threshold, const Co
         return fmt::format("{} is {:.6g}, {} wants {:.6g}", row.label, value, row.flag, threshold);
     }
     if (row.limit == Limit::kUpperEnd) {
-        if (comparison.corrected.high <= threshold) return std::nullopt;
-        return fmt::format("{} may be {:.6g}, {} allows {:.6g}", row.label, comparison.corrected.high,
+        if (comparison.metrics.corrected.high <= threshold) return std::nullopt;
+        return fmt::format("{} may be {:.6g}, {} allows {:.6g}", row.label, comparison.metrics.corrected.high,
                            row.flag, threshold);
     }
     if (!(std::abs(value) <= threshold)) {
         return fmt::format("{} is {:.6g}, {} allows {:.6g}", row.label, value, row.flag, threshold);
     }
-    const core::LeakMetric& leak = comparison.metrics.leak;
+    const core::LeakMetric& leak = comparison.metrics.image.leak;
     if (std::string_view(row.key) == "leak" && !leak.counts) {
         return fmt::format("leak does not count, since the lit side is off by {:.3g} %",
                            leak.lit_bias_percent);
@@ -237,7 +185,7 @@ std::optional<std::string> failure_of(const Row& row, double threshold, const Co
 }
 
 /// Of a threshold's flag.
-std::string help_of(const Row& row) {
+std::string help_of(const PictureMetric& row) {
     const std::string definition = *row.definition ? fmt::format(" = {}", row.definition) : "";
     switch (row.limit) {
         case Limit::kSmallest:
@@ -253,7 +201,7 @@ std::string help_of(const Row& row) {
 
 /// What makes the comparison fail, one line each.
 std::vector<std::string> failures_of(const CompareOptions& options, const Comparison& comparison) {
-    const core::ImageMetrics& metrics = comparison.metrics;
+    const core::ImageMetrics& metrics = comparison.metrics.image;
     std::vector<std::string> failures;
     if (metrics.nonfinite_pixels > 0) {
         failures.push_back(fmt::format("{} pixels are not finite ({} in the test, {} in the reference)",
@@ -261,9 +209,9 @@ std::vector<std::string> failures_of(const CompareOptions& options, const Compar
                                        metrics.nonfinite_reference_pixels));
         return failures;
     }
-    for (std::size_t i = 0; i < std::size(kRows); ++i) {
+    for (std::size_t i = 0; i < options.limits.size(); ++i) {
         if (!options.limits[i]) continue;
-        if (auto failure = failure_of(kRows[i], *options.limits[i], comparison)) {
+        if (auto failure = failure_of(picture_metrics()[i], *options.limits[i], comparison)) {
             failures.push_back(std::move(*failure));
         }
     }
@@ -273,20 +221,20 @@ std::vector<std::string> failures_of(const CompareOptions& options, const Compar
 /// What makes the numbers say less than they seem to, one line each.
 std::vector<std::string> warnings_of(const CompareOptions& options, const Comparison& comparison) {
     std::vector<std::string> warnings;
-    if (comparison.metrics.nonfinite_pixels > 0) return warnings;  // That is a failure.
+    if (comparison.metrics.image.nonfinite_pixels > 0) return warnings;  // That is a failure.
     if (comparison.black_reference) {
         warnings.emplace_back(
             "the reference is black: nothing is relative to it, and FLIP is exposed for the test");
     }
     constexpr double kNoiseShare = 0.2;  // Of any gate.
-    for (std::size_t i = 0; i < std::size(kRows); ++i) {
-        const std::string_view key = kRows[i].key;
+    for (std::size_t i = 0; i < options.limits.size(); ++i) {
+        const std::string_view key = picture_metrics()[i].key;
         if (!options.limits[i] || (key != "rel_mse" && key != "rel_mse_corrected")) continue;
         if (comparison.reference_noise > kNoiseShare * *options.limits[i]) {
             warnings.push_back(fmt::format(
                 "the reference's own noise makes a relMSE of {:.3g}, more than a fifth of what {} allows; a "
                 "reference with more samples is right",
-                comparison.reference_noise, kRows[i].flag));
+                comparison.reference_noise, picture_metrics()[i].flag));
         }
     }
     return warnings;
@@ -332,12 +280,14 @@ void compare(const CompareOptions& options, Program& program) {
         nlohmann::json report = report_of(comparison);
         report["failures"] = failures;
         report["warnings"] = warnings;
-        fmt::print("{}\n", report.dump());
+        std::fputs((report.dump() + "\n").c_str(), stdout);
     } else {
-        print_table(comparison);
+        std::fputs(table_of(comparison).c_str(), stdout);
     }
     for (const std::string& warning : warnings) warn(program, warning);
-    for (const std::string& failure : failures) fmt::print(stderr, "fieldlight: failed: {}\n", failure);
+    for (const std::string& failure : failures) {
+        std::fputs(fmt::format("fieldlight: failed: {}\n", failure).c_str(), stderr);
+    }
     if (!warnings.empty()) program.exit_code = kExitWarned;
     if (!failures.empty()) program.exit_code = kExitThresholdFailed;
 }
@@ -363,8 +313,8 @@ void add_compare_command(CLI::App& app, Program& program) {
         "Write the HDR FLIP error of every pixel as a .png: black 0 to pale yellow 1 (magma); pixels "
         "that are not finite come out magenta");
     options->scene.add_to(verb);
-    for (std::size_t i = 0; i < std::size(kRows); ++i) {
-        const Row& row = kRows[i];
+    for (std::size_t i = 0; i < options->limits.size(); ++i) {
+        const PictureMetric& row = picture_metrics()[i];
         verb.add_option(row.flag, options->limits[i], help_of(row))
             ->check(CLI::NonNegativeNumber)
             ->group("Thresholds (any pixel that is not finite fails, too)");

@@ -110,6 +110,7 @@ core::Image make_reference(const Program& program, const CompareSceneOptions& op
     report.reference_seed = render.seed;
     report.reference_reused = reference.reused;
     report.reference_seconds = reference.seconds;
+    report.reference_render_seconds = reference.render_seconds;
     report.reference_rel_variance = reference.rel_variance;
     report.reference_command = render_line(render, program.common.allow_external);
     return std::move(reference.image);

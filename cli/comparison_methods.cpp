@@ -3,13 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "cli/recorded_seconds.h"
 #include "cli/stage_clock.h"
-#include "core/support/atomic_file.h"
-#include "core/support/error.h"
-#include "core/support/file_bytes.h"
 #include "core/support/hash.h"
 #include "sdf/transform_scale.h"
 
@@ -21,7 +18,6 @@ namespace fs = std::filesystem;
 
 /// Beside the fields: what baking all of them took, which the files themselves must not depend on.
 constexpr const char* kPriceFile = "bake_seconds.json";
-constexpr std::uint64_t kMostPriceBytes = 4096;
 
 /// Hash of what the fields were baked from and how.
 std::string price_key(const sdf::BakeResult& baked) {
@@ -35,33 +31,16 @@ std::string price_key(const sdf::BakeResult& baked) {
     return hasher.hex();
 }
 
-void record_price(const fs::path& folder, const sdf::BakeResult& baked) {
-    const nlohmann::json price = {{"schema", 1}, {"fields", price_key(baked)}, {"seconds", baked.seconds}};
-    core::write_text_atomically(folder / kPriceFile, price.dump() + "\n");
-}
-
-/// What an earlier run recorded for the same fields; nothing where there is no such record.
-std::optional<double> recorded_price(const fs::path& folder, const sdf::BakeResult& baked) {
-    if (!fs::is_regular_file(folder / kPriceFile)) return std::nullopt;
-    const std::vector<std::uint8_t> bytes = core::read_file_bytes(folder / kPriceFile, kMostPriceBytes);
-    const nlohmann::json price = nlohmann::json::parse(bytes, nullptr, false);
-    if (!price.is_object() || price.value("fields", nlohmann::json()) != price_key(baked))
-        return std::nullopt;
-    const nlohmann::json seconds = price.value("seconds", nlohmann::json());
-    if (!seconds.is_number()) return std::nullopt;
-    return seconds.get<double>();
-}
-
 void set_bake_price(const fs::path& folder, const sdf::BakeResult& baked, ReportSeries& series) {
     const auto is_reused = [](const sdf::MeshBake& mesh) { return mesh.reused; };
     series.bake_seconds = baked.seconds;
     if (std::none_of(baked.meshes.begin(), baked.meshes.end(), is_reused)) {
-        record_price(folder, baked);
+        record_seconds(folder / kPriceFile, price_key(baked), baked.seconds);
         return;
     }
     series.bake_reused = true;
     if (!std::all_of(baked.meshes.begin(), baked.meshes.end(), is_reused)) return;
-    if (const std::optional<double> seconds = recorded_price(folder, baked)) {
+    if (const std::optional<double> seconds = recorded_seconds(folder / kPriceFile, price_key(baked))) {
         series.bake_seconds = *seconds;
         series.bake_reused = false;
         series.bake_recorded = true;

@@ -137,9 +137,6 @@ void inspect(const Program& program, const InspectOptions& options) {
     if (program.common.json)
         text = result.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
     std::fputs(text.c_str(), stdout);
-    if (std::fflush(stdout) != 0) {
-        throw core::InputError(core::ErrorKind::kInputOutput, "standard output cannot be written");
-    }
 }
 
 }  // namespace

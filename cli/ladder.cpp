@@ -57,7 +57,8 @@ struct Ladder {
     void judge(const core::Image& image, Method& method, ReportPoint& point) const {
         const std::vector<glm::vec3> radiance = *image.color();
         point.metrics = core::compare_images(radiance, reference_radiance);
-        const core::ErrorInterval corrected = core::corrected_rel_mse(image, reference);
+        point.blocks = core::corrected_rel_mse_blocks(image, reference);
+        const core::ErrorInterval corrected = core::mean_error(point.blocks);
         point.rel_mse = {corrected.value, corrected.low, corrected.high};
         core::FlipResult flip = core::flip_hdr(radiance, reference_radiance, image.width(), image.height());
         point.flip = flip.mean;

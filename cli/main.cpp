@@ -23,6 +23,13 @@ int fail(int code, const char* message) {
     return code;
 }
 
+/// Data on stdout that could not be written is a failure like any other.
+int finish(int code) {
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || !std::cout.flush())
+        return fail(kExitInputOutput, "cannot write to stdout");
+    return code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -44,12 +51,9 @@ int main(int argc, char** argv) {
 
     try {
         app.parse(argc, argv);
-        // Data on stdout that could not be written is a failure like any other.
-        if (std::fflush(stdout) != 0 || !std::cout.flush())
-            return fail(kExitInputOutput, "cannot write to stdout");
-        return program.exit_code;
+        return finish(program.exit_code);
     } catch (const CLI::Success& help) {
-        return app.exit(help);
+        return finish(app.exit(help));
     } catch (const CLI::ParseError& error) {
         return fail(kExitUsage, cli::explain_parse_error(app, error, program.arguments).c_str());
     } catch (const core::InputError& error) {

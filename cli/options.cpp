@@ -18,6 +18,7 @@
 #include <new>
 #include <system_error>
 
+#include "core/support/atomic_file.h"
 #include "core/support/error.h"
 #include "core/support/memory.h"
 #include "core/support/parallel.h"
@@ -141,6 +142,7 @@ bool is_out_of_memory() {
 [[noreturn]] void on_terminate() {
     if (std::current_exception() && is_out_of_memory()) {
         std::fputs(kOutOfMemoryMessage, stderr);
+        core::remove_temporary_files();
         std::_Exit(static_cast<int>(core::ErrorKind::kOutOfMemory));
     }
     std::abort();

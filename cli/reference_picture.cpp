@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "cli/recorded_seconds.h"
 #include "cli/stage_clock.h"
 #include "core/image/error_estimate.h"
 #include "core/image/exr.h"
@@ -77,7 +78,7 @@ ReferencePicture reference_picture(const Program& program, const RenderOptions& 
                                    const core::Scene& scene, const core::Camera& camera,
                                    const SceneTracers& tracers, const fs::path& folder) {
     const std::string key = key_of(options, scene, camera);
-    const fs::path file = folder / (key + ".exr");
+    const fs::path file = folder / (key + ".exr"), price_file = folder / (key + ".json");
     ReferencePicture reference;
     if (fs::exists(file)) {
         std::string reason;
@@ -85,6 +86,7 @@ ReferencePicture reference_picture(const Program& program, const RenderOptions& 
             note(program, fmt::format("'{}': this reference of an earlier run is used", file.string()));
             reference.image = std::move(*kept);
             reference.reused = true;
+            reference.render_seconds = recorded_seconds(price_file, key);
         } else {
             warn(program,
                  fmt::format("'{}': rendered again, because the reference of an earlier run is of no "
@@ -96,10 +98,12 @@ ReferencePicture reference_picture(const Program& program, const RenderOptions& 
         StageClock clock;
         core::Frame frame = render_frame(program, options, scene, camera, tracers);
         reference.seconds = clock.lap();
+        reference.render_seconds = reference.seconds;
         core::ExrAttributes attributes = picture_attributes(options, scene, camera, frame);
         attributes[kKeyAttribute] = key;
         attributes[kPixelAttribute] = pixel_hash(frame.image);
         core::write_exr(file, frame.image, attributes);
+        record_seconds(price_file, key, reference.seconds);
         reference.image = std::move(frame.image);
     }
     reference.rel_variance = core::noise_rel_mse(reference.image);

@@ -121,11 +121,23 @@ void require_picture_memory(const RenderOptions& options) {
                                      options.output.string(), width, height, options.aovs.size()));
 }
 
+std::filesystem::path preview_file(const RenderOptions& options) {
+    return std::filesystem::path(options.output).replace_extension(".png");
+}
+
+/// Told now and not after minutes of rendering; and before a bake makes the folder for itself.
+void require_places_for_files(const RenderOptions& options) {
+    core::require_place_for_file(options.output);
+    if (options.png) core::require_place_for_file(preview_file(options));
+    if (!options.stats.empty()) core::require_place_for_file(options.stats);
+}
+
 }  // namespace
 
 nlohmann::json run_render(const Program& program, const RenderOptions& options) {
     StageClock clock;
     require_picture_memory(options);
+    require_places_for_files(options);
     const core::Scene scene = load_scene(program, options.scene);
     const core::Camera camera =
         choose_camera(program, options.scene, scene, static_cast<double>(options.width) / options.height);
@@ -154,8 +166,8 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     }
     if (options.png) {
         const float ev = options.exposure ? *options.exposure : core::automatic_exposure(frame.image);
-        core::write_png(std::filesystem::path(options.output).replace_extension(".png"), frame.image.width(),
-                        frame.image.height(), core::display_picture(frame.image, ev, options.tone_map));
+        core::write_png(preview_file(options), frame.image.width(), frame.image.height(),
+                        core::display_picture(frame.image, ev, options.tone_map));
     }
     const double write_seconds = clock.lap();
 

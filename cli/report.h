@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/image/block_errors.h"
 #include "core/image/metrics.h"
 
 namespace cli {
@@ -38,6 +39,7 @@ struct ReportPoint {
     std::uint64_t rays = 0;
     core::ImageMetrics metrics;  ///< Against the reference, as measured: its noise included.
     Estimate rel_mse;            ///< metrics.rel_mse without the reference's variance.
+    core::BlockErrors blocks;    ///< What rel_mse is the mean of; not told, but compared in pairs.
     double flip = 0.0;           ///< Mean HDR FLIP; NaN where it is not defined.
     bool pareto = false;         ///< No point of any series has less error in no more time (warm).
     std::string command;         ///< Renders this picture.
@@ -65,6 +67,13 @@ struct ReportSeries {
     std::optional<Estimate> rel_mse_at_equal_time;  ///< At Report::equal_seconds.
 
     std::vector<StageCost> stages;  ///< Of the last rung.
+};
+
+/// Two methods at equal time, block by block against the one reference, so that its noise cancels.
+struct PairedComparison {
+    std::string better, worse;  ///< Methods; `better` has the smaller error.
+    Estimate difference;        ///< Of relMSE: what `worse` has more; see core::paired_difference.
+    bool decided = false;       ///< The interval leaves 0 out.
 };
 
 /// A scene's fields against its triangles on the same rays; definitions in core/trace/tracer_difference.h.
@@ -115,12 +124,15 @@ struct Report {
     int reference_samples = 0;
     std::uint64_t reference_seed = 0;
     bool reference_reused = false;
-    double reference_seconds = 0.0;       ///< 0 where it was reused.
-    double reference_rel_variance = 0.0;  ///< Its own relMSE against the truth, from its variance.
+    double reference_seconds = 0.0;                  ///< Of this run; 0 where it was reused.
+    std::optional<double> reference_render_seconds;  ///< In whichever run; empty where none recorded it.
+    double reference_rel_variance = 0.0;             ///< Its own relMSE against the truth, from its variance.
     std::string reference_command;
 
-    double equal_seconds = 0.0;  ///< The time at which the methods are compared at equal time.
-    std::string verdict;         ///< One sentence.
+    double equal_seconds = 0.0;            ///< The time at which the methods are compared at equal time.
+    std::vector<PairedComparison> paired;  ///< At that time: every pair of methods that reached it.
+    std::string winner;   ///< The method that is decided to be better than all others, or empty.
+    std::string verdict;  ///< One sentence.
     std::vector<std::string> warnings;
 
     std::vector<ReportSeries> series;
@@ -130,7 +142,7 @@ struct Report {
 };
 
 /// The object of report.json (schema 1): `geometry`, `series` (method, settings, seconds, cpu_seconds, rays,
-/// metrics, command), `pareto` and everything else but the pictures' values.
+/// metrics, command), `pareto` and everything else but the values of pictures and blocks.
 nlohmann::json report_json(const Report& report);
 
 /// What a person reads on the terminal: a line a rung, the geometry, the verdict.

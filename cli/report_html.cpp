@@ -46,7 +46,30 @@ const Term kTerms[] = {
      "relative "
      "error of 100 % above it. Both need three points."},
     {"Warm, cold", "the wall time of the rendering alone; the same with loading, baking and building."},
-    {"95 % intervals", "of the value beside them. Where two overlap, no method is called better."},
+    {"95 % intervals",
+     "of the value beside them: of measured errors by a jackknife over blocks of 16 × 16 pixels (smaller in "
+     "small "
+     "pictures), of fitted values by how points scatter around the fit. Where two overlap, no method is "
+     "called better, "
+     "but for the error at equal time, which is decided in pairs."},
+    {"Paired, winner",
+     "at equal time each two methods are compared block by block against the one reference: the square of "
+     "its noise is "
+     "in both and cancels. The difference of their relMSE has a 95 % interval (Student’s t) from how far "
+     "each block’s "
+     "difference is from what the methods’ other rungs, rendered with other seeds, foretell of it, so that "
+     "what the "
+     "view itself makes of it does not count as uncertain. A pair is decided where the interval leaves 0 "
+     "out; the "
+     "winner is the method that is decided to be better than every other. Times count as exact."},
+    {"Equal time",
+     "the longest time that every method reached. A method that has no point there is read off between its "
+     "two "
+     "nearest, as b² + v/t through both."},
+    {"Seeds",
+     "the random numbers of a picture: each rung has its own seed, the same for all methods, and the "
+     "reference one "
+     "that no rung has."},
     {"Dominated", "another point has less error in no more warm time. Such points are hollow."},
     {"FLIP",
      "mean HDR FLIP against the reference, 67 pixels a degree: 0 is equal, 1 as different as can be "
@@ -231,6 +254,13 @@ std::string commands(const Report& report) {
            html + "</div>\n";
 }
 
+/// What the reference cost, and whether this run paid it.
+std::string reference_price(const Report& report) {
+    if (!report.reference_reused) return significant(report.reference_seconds) + " s";
+    if (!report.reference_render_seconds) return "reused from an earlier run, which did not record its time";
+    return fmt::format("{} s in an earlier run, reused", significant(*report.reference_render_seconds));
+}
+
 std::string settings(const Report& report) {
     std::string html = "<dl class=\"facts\">\n" + text_fact("Scene", report.scene) +
                        text_fact("Hash of the scene", report.scene_hash) +
@@ -240,14 +270,15 @@ std::string settings(const Report& report) {
                        fact("Bounces", report.bounces < 0 ? "no limit" : fmt::format("{}", report.bounces)) +
                        fact("Seed", fmt::format("{}", report.seed));
     html += fact("Reference",
-                 fmt::format("{} samples a pixel, {}{} s",
+                 fmt::format("{} samples a pixel, {}",
                              grouped(static_cast<std::uint64_t>(std::max(report.reference_samples, 0))),
-                             report.reference_reused ? "from an earlier run, " : "",
-                             significant(report.reference_seconds)));
+                             reference_price(report)));
+    html += fact("Seed of the reference", fmt::format("{}", report.reference_seed));
     html += fact("Noise of the reference", significant(error_percent(report.reference_rel_variance)) + " %");
     html +=
         text_fact("Processor", report.processor) +
         fact("Cores, threads", fmt::format("{}, {}", report.cores, report.threads)) +
+        fact("Most memory held", significant(1e-6 * static_cast<double>(report.peak_bytes)) + " MB") +
         text_fact("Instruction set", report.isa) + text_fact("System", report.system) +
         text_fact("Compiler", report.compiler) + text_fact("Flags", report.flags) +
         text_fact("Fieldlight", report.version + (report.commit.empty() ? "" : ", commit " + report.commit)) +
@@ -293,7 +324,7 @@ std::string section_html(const Section& section) {
 
 std::vector<Section> sections_of(const Report& report) {
     std::vector<Section> sections = {
-        {"summary", "Summary", "What accuracy costs", summary_table(report)},
+        {"summary", "Summary", "What accuracy costs", summary_table(report) + paired_table(report)},
         {"error", "Error against time", "Error against time", plots(report)},
         {"pictures", "Pictures", "Pictures", ""},
         {"geometry", "Geometry", "Fields against triangles, ray by ray", geometry_table(report)},

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "cli/picture_metrics.h"
 #include "cli/report.h"
 
 namespace cli {
@@ -23,7 +24,8 @@ json as_json(const std::optional<Estimate>& estimate) {
 }
 
 json as_json(const ReportPoint& point) {
-    const core::ImageMetrics& metrics = point.metrics;
+    json metrics = metrics_json({.image = point.metrics, .flip = point.flip}, false);
+    metrics["leak_counts"] = point.metrics.leak.counts;
     return {{"samples_per_pixel", point.samples_per_pixel},
             {"seed", point.seed},
             {"seconds", point.seconds},
@@ -31,24 +33,7 @@ json as_json(const ReportPoint& point) {
             {"rays", point.rays},
             {"rel_mse", as_json(point.rel_mse)},
             {"pareto", point.pareto},
-            {"metrics",
-             {{"mse", number(metrics.mse)},
-              {"rel_mse", number(metrics.rel_mse)},
-              {"rel_mse_trimmed", number(metrics.rel_mse_trimmed)},
-              {"mrse", number(metrics.mrse)},
-              {"mape", number(metrics.mape)},
-              {"smape", number(metrics.smape)},
-              {"percentiles",
-               {{"50", number(metrics.p50)},
-                {"95", number(metrics.p95)},
-                {"99", number(metrics.p99)},
-                {"99.9", number(metrics.p99_9)}}},
-              {"max", number(metrics.max)},
-              {"energy_bias", number(metrics.energy_bias_percent)},
-              {"leak", number(metrics.leak.energy_fraction)},
-              {"leak_counts", metrics.leak.counts},
-              {"flip", number(point.flip)},
-              {"nonfinite_pixels", metrics.nonfinite_pixels}}},
+            {"metrics", metrics},
             {"command", point.command}};
 }
 
@@ -76,6 +61,13 @@ json as_json(const ReportSeries& series) {
             {"points", points}};
 }
 
+json as_json(const PairedComparison& pair) {
+    return {{"better", pair.better},
+            {"worse", pair.worse},
+            {"rel_mse_difference", as_json(pair.difference)},
+            {"decided", pair.decided}};
+}
+
 json as_json(const ReportGeometry& geometry) {
     return {{"method", geometry.method},
             {"resolution", geometry.resolution},
@@ -98,7 +90,8 @@ json as_json(const ReportGeometry& geometry) {
 }  // namespace
 
 json report_json(const Report& report) {
-    json series = json::array(), pareto = json::array(), geometry = json::array(), pictures = json::array();
+    json series = json::array(), pareto = json::array(), paired = json::array(), geometry = json::array(),
+         pictures = json::array();
     for (const ReportSeries& one : report.series) {
         series.push_back(as_json(one));
         for (const ReportPoint& point : one.points) {
@@ -109,6 +102,7 @@ json report_json(const Report& report) {
                               {"rel_mse", number(point.rel_mse.value)}});
         }
     }
+    for (const PairedComparison& one : report.paired) paired.push_back(as_json(one));
     for (const ReportGeometry& one : report.geometry) geometry.push_back(as_json(one));
     for (const ReportPicture& one : report.pictures) {
         pictures.push_back({{"name", one.name}, {"exr", one.exr}});
@@ -141,10 +135,14 @@ json report_json(const Report& report) {
               {"seed", report.reference_seed},
               {"reused", report.reference_reused},
               {"seconds", report.reference_seconds},
+              {"render_seconds",
+               report.reference_render_seconds ? number(*report.reference_render_seconds) : json(nullptr)},
               {"rel_variance", number(report.reference_rel_variance)},
               {"command", report.reference_command}}},
             {"equal_seconds", report.equal_seconds},
             {"verdict", report.verdict},
+            {"winner", report.winner.empty() ? json(nullptr) : json(report.winner)},
+            {"paired", paired},
             {"warnings", report.warnings},
             {"series", series},
             {"pareto", pareto},

@@ -12,13 +12,13 @@
 #include "cli/report_markup.h"
 #include "cli/report_plot.h"
 #include "cli/report_series.h"
+#include "cli/verdict.h"
 
 namespace cli {
 
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kTargetRelMse = 0.05 * 0.05;
 
 Estimate percent_of(const Estimate& rel_mse) {
     return {error_percent(rel_mse.value), error_percent(rel_mse.low), error_percent(rel_mse.high)};
@@ -57,7 +57,7 @@ Cell leak_cell(const core::LeakMetric& leak) {
 Cell time_to_target(const ReportSeries& series) {
     if (series.seconds_to_5_percent) return estimate_cell(*series.seconds_to_5_percent);
     if (!series.floor) return missing("fewer than three points: no fit");
-    if (series.floor->value >= kTargetRelMse) {
+    if (series.floor->value >= kFivePercentRelMse) {
         Cell cell = missing("its floor is above 5 %");
         cell.value = "never";
         return cell;
@@ -72,6 +72,14 @@ Cell fitted(const std::optional<Estimate>& estimate) {
 std::optional<Estimate> percent_of(const std::optional<Estimate>& rel_mse) {
     if (!rel_mse) return std::nullopt;
     return percent_of(*rel_mse);
+}
+
+/// Marker and name of the series of that method.
+std::string name_of(const Report& report, const std::string& method) {
+    for (std::size_t i = 0; i < report.series.size(); ++i) {
+        if (report.series[i].method == method) return series_name(report, i);
+    }
+    return escape_html(method);
 }
 
 Cell method_cell(const Report& report, std::size_t series) {
@@ -136,12 +144,11 @@ std::string summary_table(const Report& report) {
         {"Build", "s", "building the acceleration structure"},
     };
     std::vector<std::vector<Cell>> rows;
-    std::vector<std::optional<Estimate>> times, errors, floors, variances;
+    std::vector<std::optional<Estimate>> times, floors, variances;
     bool reused = false, recorded = false;
     for (std::size_t i = 0; i < report.series.size(); ++i) {
         const ReportSeries& series = report.series[i];
         times.push_back(series.seconds_to_5_percent);
-        errors.push_back(percent_of(series.rel_mse_at_equal_time));
         floors.push_back(percent_of(series.floor));
         variances.push_back(series.variance_seconds);
         const ReportPoint* last = series.points.empty() ? nullptr : &series.points.back();
@@ -154,24 +161,45 @@ std::string summary_table(const Report& report) {
             bake.value += "‡";
             recorded = true;
         }
-        rows.push_back({method_cell(report, i), time_to_target(series), fitted(errors.back()),
-                        fitted(floors.back()), fitted(series.variance_seconds),
+        rows.push_back({method_cell(report, i), time_to_target(series),
+                        fitted(percent_of(series.rel_mse_at_equal_time)), fitted(floors.back()),
+                        fitted(series.variance_seconds),
                         last && std::isfinite(last->flip) ? number_cell(last->flip) : missing("not defined"),
                         last ? leak_cell(last->metrics.leak) : missing("no points"),
                         number_cell(static_cast<double>(series.bytes) * 1e-6),
                         seconds_cell(series.load_seconds), bake, seconds_cell(series.build_seconds)});
     }
     mark_best(times, 1, rows);
-    mark_best(errors, 2, rows);
+    for (std::size_t i = 0; i < report.series.size(); ++i) {
+        rows[i][2].strong = !report.winner.empty() && report.series[i].method == report.winner;
+    }
     mark_best(floors, 3, rows);
     mark_best(variances, 4, rows);
     std::string caption =
-        "Small: 95 % intervals. Bold: better than every other method beyond both intervals; where they "
-        "overlap "
-        "nothing is bold. Grey: does not count.";
+        "Small: 95 % intervals. Bold: better than every other method beyond both intervals, and for the "
+        "error "
+        "at equal time in every pair below; otherwise nothing is bold. Grey: does not count.";
     if (reused) caption += " † Some fields came from an earlier run: the whole price is higher.";
     if (recorded) caption += " ‡ The fields came from an earlier run, which recorded their price.";
     return table(caption, columns, rows);
+}
+
+std::string paired_table(const Report& report) {
+    if (report.paired.empty()) return "";
+    const std::vector<Column> columns = {
+        {"Less error", "", "method with the smaller relMSE at equal time", true},
+        {"More error", "", "method with the larger one", true},
+        {"Difference", "relMSE", "what it has more, paired over blocks of pixels"},
+        {"Decided", "", "the interval leaves 0 out", true}};
+    std::vector<std::vector<Cell>> rows;
+    for (const PairedComparison& pair : report.paired) {
+        rows.push_back({{.value = name_of(report, pair.better)},
+                        {.value = name_of(report, pair.worse)},
+                        estimate_cell(pair.difference),
+                        {.value = pair.decided ? "yes" : "no", .quiet = !pair.decided}});
+    }
+    return table("Small: paired 95 % intervals; a method wins where every pair with it is decided.", columns,
+                 rows);
 }
 
 std::string geometry_table(const Report& report) {
@@ -229,6 +257,7 @@ std::string runs_table(const Report& report) {
     const std::vector<Column> columns = {
         {"Method", "", "", true},
         {"Samples", "a pixel", "links to the command"},
+        {"Seed", "", "of the random numbers: one a rung, the same for all methods", true},
         {"Wall", "s", "wall time of the rendering"},
         {"CPU", "s", "processor time over all threads"},
         {"Rays", "millions", ""},
@@ -249,6 +278,7 @@ std::string runs_table(const Report& report) {
                             {.value = fmt::format(
                                  "<a href=\"#run-{}-{}\">{}</a>", i, k,
                                  grouped(static_cast<std::uint64_t>(std::max(point.samples_per_pixel, 0))))},
+                            {.value = fmt::format("{}", point.seed)},
                             seconds_cell(point.seconds),
                             seconds_cell(point.cpu_seconds),
                             number_cell(static_cast<double>(point.rays) * 1e-6),

@@ -11,6 +11,9 @@ namespace cli {
 /// One row a series: what accuracy costs, and what making the structure costs.
 std::string summary_table(const Report& report);
 
+/// One row a pair of methods at equal time. Empty where none were compared.
+std::string paired_table(const Report& report);
+
 /// One row a measure, one column a series with fields. Empty where nothing was measured.
 std::string geometry_table(const Report& report);
 

@@ -4,8 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <limits>
+#include <set>
+#include <utility>
 
+#include "core/image/block_errors.h"
 #include "core/image/error_estimate.h"
 
 namespace cli {
@@ -13,10 +18,6 @@ namespace cli {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-
-bool overlap(const Estimate& a, const Estimate& b) {
-    return a.low <= b.high && b.low <= a.high;
-}
 
 std::string text_of(const Estimate& estimate) {
     return fmt::format("{:.3g} [{:.3g}, {:.3g}]", estimate.value, estimate.low, estimate.high);
@@ -41,7 +42,7 @@ double time_to(double error, double floor, double slope) {
     return floor < error ? slope / (error - floor) : kNever;
 }
 
-Estimate scaled(const core::ErrorInterval& interval, double factor) {
+Estimate scaled(const core::ErrorInterval& interval, double factor = 1.0) {
     return {factor * interval.value, factor * interval.low, factor * interval.high};
 }
 
@@ -56,7 +57,7 @@ void fit(ReportSeries& series) {
     const std::optional<core::ErrorFit> found = core::fit_error_over_time(samples, errors);
     if (!found) return;
     const ReportPoint& longest = series.points.back();
-    series.floor = scaled(found->floor, 1.0);
+    series.floor = scaled(found->floor);
     series.variance_seconds = scaled(found->slope, longest.seconds / longest.samples_per_pixel);
     const Estimate &floor = *series.floor, &slope = *series.variance_seconds;
     const Estimate time{time_to(kFivePercentRelMse, floor.value, slope.value),
@@ -87,56 +88,127 @@ std::string floor_sentence(const Report& report) {
                        text_of(*fields->floor));
 }
 
-}  // namespace
+/// The rungs between which a time lies, as floor + v / t through both; the same rung twice where it is the
+/// last.
+struct Reached {
+    const ReportPoint& before;
+    const ReportPoint& after;
+    double share = 0.0;  ///< Of `after`.
+};
 
-std::optional<Estimate> error_at(const ReportSeries& series, double seconds) {
+std::optional<Reached> reached_at(const ReportSeries& series, double seconds) {
     const std::vector<ReportPoint>& points = series.points;
     // From the back, since noise may make a rung quicker than the one before it.
     const auto reached = std::find_if(points.rbegin(), points.rend(),
                                       [&](const ReportPoint& point) { return point.seconds <= seconds; });
     if (reached == points.rend()) return std::nullopt;
-    if (reached == points.rbegin()) return reached->rel_mse;
+    if (reached == points.rbegin()) return Reached{*reached, *reached};
     const ReportPoint &before = *reached, &after = *std::prev(reached);
-    const double share =
-        (1.0 / before.seconds - 1.0 / seconds) / (1.0 / before.seconds - 1.0 / after.seconds);
-    const auto between = [&](double from, double to) { return from + share * (to - from); };
-    return Estimate{between(before.rel_mse.value, after.rel_mse.value),
-                    between(before.rel_mse.low, after.rel_mse.low),
-                    between(before.rel_mse.high, after.rel_mse.high)};
+    return Reached{before, after,
+                   (1.0 / before.seconds - 1.0 / seconds) / (1.0 / before.seconds - 1.0 / after.seconds)};
 }
 
-std::string verdict_of(const Report& report) {
+/// Series that reached the common time, by ascending error there.
+std::vector<const ReportSeries*> judged_series(const Report& report) {
     std::vector<const ReportSeries*> judged;
     for (const ReportSeries& series : report.series) {
         if (series.rel_mse_at_equal_time) judged.push_back(&series);
     }
-    std::sort(judged.begin(), judged.end(), [](const ReportSeries* a, const ReportSeries* b) {
+    std::stable_sort(judged.begin(), judged.end(), [](const ReportSeries* a, const ReportSeries* b) {
         return a->rel_mse_at_equal_time->value < b->rel_mse_at_equal_time->value;
     });
+    return judged;
+}
+
+/// What the rungs of a series but those in `taken` say of its errors: their weighted sum, the more samples
+/// the more. Empty where there are no others.
+core::BlockErrors errors_of_other_rungs(const ReportSeries& series, const std::set<std::uint64_t>& taken) {
+    core::BlockErrors sum;
+    for (const ReportPoint& point : series.points) {
+        if (taken.count(point.seed)) continue;
+        // The noise of a squared error falls with the square of the samples.
+        core::accumulate(sum, point.blocks, std::pow(point.samples_per_pixel, 2.0));
+    }
+    return sum;
+}
+
+/// What `worse` has more than `better` after `seconds`, paired.
+core::ErrorInterval difference_at(const ReportSeries& worse, const ReportSeries& better, double seconds,
+                                  int reference_samples) {
+    // Rungs of equal seeds share random numbers, whatever the method.
+    std::set<std::uint64_t> taken;
+    int samples = 0;
+    const auto errors = [&](const ReportSeries& series) {
+        const Reached reached = *reached_at(series, seconds);
+        taken.insert({reached.before.seed, reached.after.seed});
+        samples = std::max(samples, reached.after.samples_per_pixel);
+        return core::mixed(reached.before.blocks, reached.after.blocks, reached.share);
+    };
+    const core::BlockErrors more = errors(worse), less = errors(better);
+    std::vector<core::BlockErrors> predictors;
+    for (const ReportSeries* series : {&worse, &better}) {
+        core::BlockErrors others = errors_of_other_rungs(*series, taken);
+        if (!others.sums.empty()) predictors.push_back(std::move(others));
+    }
+    return core::paired_difference(more, less, predictors,
+                                   static_cast<double>(samples) / std::max(reference_samples, 1));
+}
+
+/// Fills `paired` and `winner`. Every pair has its own 95 %: that a winner must be better than *all* others
+/// keeps the chance of a false one at 5 % without a correction for their number.
+void compare_in_pairs(Report& report) {
+    const std::vector<const ReportSeries*> judged = judged_series(report);
+    std::size_t lost_to_first = 0;
+    for (std::size_t i = 0; i < judged.size(); ++i) {
+        for (std::size_t k = i + 1; k < judged.size(); ++k) {
+            PairedComparison pair{judged[i]->method, judged[k]->method,
+                                  scaled(difference_at(*judged[k], *judged[i], report.equal_seconds,
+                                                       report.reference_samples))};
+            pair.decided = pair.difference.low > 0.0;
+            if (i == 0 && pair.decided) ++lost_to_first;
+            report.paired.push_back(std::move(pair));
+        }
+    }
+    if (judged.size() > 1 && lost_to_first + 1 == judged.size()) report.winner = judged.front()->method;
+}
+
+}  // namespace
+
+std::optional<Estimate> error_at(const ReportSeries& series, double seconds) {
+    const std::optional<Reached> reached = reached_at(series, seconds);
+    if (!reached) return std::nullopt;
+    const Estimate &before = reached->before.rel_mse, &after = reached->after.rel_mse;
+    if (&before == &after) return before;  // Not inf - inf.
+    const auto between = [&](double from, double to) { return from + reached->share * (to - from); };
+    return Estimate{between(before.value, after.value), between(before.low, after.low),
+                    between(before.high, after.high)};
+}
+
+std::string verdict_of(const Report& report) {
+    const std::vector<const ReportSeries*> judged = judged_series(report);
     const std::string floor = floor_sentence(report);
     if (judged.size() < 2) {
         return fmt::format("No two methods reached a common time, so that there is no winner; {}.", floor);
     }
-    const Estimate& best = *judged.front()->rel_mse_at_equal_time;
-    std::vector<std::string> tied;
-    for (const ReportSeries* series : judged) {
-        if (overlap(best, *series->rel_mse_at_equal_time)) {
-            tied.push_back(fmt::format("{} at {}", series->method, text_of(*series->rel_mse_at_equal_time)));
-        }
+    const ReportSeries& best = *judged.front();
+    const std::string best_error = fmt::format("{:.3g}", best.rel_mse_at_equal_time->value);
+    std::vector<std::string> tied, lost;
+    for (const PairedComparison& pair : report.paired) {
+        if (pair.better != best.method) continue;
+        (pair.decided ? lost : tied).push_back(fmt::format("{} ({})", text_of(pair.difference), pair.worse));
     }
-    if (tied.size() > 1) {
+    if (report.winner.empty()) {
         return fmt::format(
-            "At equal time ({:.3g} s of rendering) there is no winner, because the 95 % intervals of relMSE "
-            "overlap: {}; {}.",
-            report.equal_seconds, fmt::join(tied, ", "), floor);
+            "At equal time ({:.3g} s of rendering) there is no winner: {} came to the smallest relMSE, {}, "
+            "but "
+            "paired over blocks of pixels what others have more cannot be told from 0: {}; {}.",
+            report.equal_seconds, best.method, best_error, fmt::join(tied, ", "), floor);
     }
-    const ReportSeries& second = *judged[1];
     return fmt::format(
-        "At equal time ({:.3g} s of rendering) the least error is that of {}: relMSE {} against {} of {}, "
-        "the "
-        "next best; {}.",
-        report.equal_seconds, judged.front()->method, text_of(best), text_of(*second.rel_mse_at_equal_time),
-        second.method, floor);
+        "At equal time ({:.3g} s of rendering) the least error is that of {}: relMSE {}; paired over blocks "
+        "of "
+        "pixels, the others have more by {}; {}.",
+        report.equal_seconds, report.winner, best_error, fmt::join(lost, ", "), floor);
 }
 
 void judge(Report& report) {
@@ -162,6 +234,7 @@ void judge(Report& report) {
                               (kReferenceShare * kFivePercentRelMse)) +
                 1));
     }
+    compare_in_pairs(report);
     report.verdict = verdict_of(report);
 }
 

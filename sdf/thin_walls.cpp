@@ -74,6 +74,8 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
             const Triangle& triangle = corners[solid_triangles[i]];
             const glm::dvec3 scaled = triangle.scaled_normal();
             area[i] = 0.5 * glm::length(scaled);
+            // An area that the mesh's own unit could still hold may vanish beside the extent of the rest.
+            if (!(area[i] > 0.0)) continue;
             const glm::dvec3 inward = (inverted[i] ? 1.0 : -1.0) * glm::normalize(scaled);
             pieces.clear();
             cut(triangle, pieces);

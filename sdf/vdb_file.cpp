@@ -13,11 +13,13 @@
 #include <limits>
 #include <new>
 #include <sstream>
+#include <stdexcept>
 
 #include "core/support/atomic_file.h"
 #include "core/support/error.h"
 #include "core/support/file_bytes.h"
 #include "core/support/hash.h"
+#include "core/support/memory.h"
 #include "sdf/feature_ranges.h"
 #include "sdf/vdb_scan.h"
 
@@ -54,6 +56,7 @@ void with_open_file(const fs::path& path, const std::function<void(openvdb::io::
     initialize_openvdb();
     scan_vdb(core::read_file_bytes(path, kMostFileBytes), path.string());
     try {
+        const core::ScopedCheckedAlignedMemory checked;
         openvdb::io::File file(path.string());
         // Delayed loading maps the file, and a truncated one would then kill the program at first touch.
         file.open(false);
@@ -116,11 +119,10 @@ openvdb::math::Transform::Ptr make_transform(const FieldInfo& info) {
 
 /// The file's header carries random bytes as an identity. They become a hash of what decides the samples, so
 /// that the same bake is the same file.
-void make_identity_reproducible(const fs::path& path, const FieldInfo& info) {
+void make_identity_reproducible(std::iostream& file, const FieldInfo& info) {
     constexpr std::streamoff kIdentityOffset = 21;
     constexpr std::array<std::size_t, 4> kDashes{8, 13, 18, 23};
     std::array<char, 36> identity{};
-    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
     file.seekg(kIdentityOffset);
     file.read(identity.data(), identity.size());
     for (const std::size_t dash : kDashes) {
@@ -137,6 +139,14 @@ void make_identity_reproducible(const fs::path& path, const FieldInfo& info) {
     file.seekp(kIdentityOffset);
     file.write(identity.data(), identity.size());
 }
+
+/// Writes what openvdb::io::File writes, which says nothing where the disk is full, to a stream that does.
+class SeekableArchive : public openvdb::io::Archive {
+public:
+    void write_grids(std::ostream& stream, const openvdb::GridCPtrVec& grids) const {
+        Archive::write(stream, grids, /*seekable=*/true);
+    }
+};
 
 }  // namespace
 
@@ -169,17 +179,20 @@ void write_field(const fs::path& path, const SampledField& field, const std::str
 
     core::write_file_atomically(path, [&](const fs::path& temporary) {
         try {
-            openvdb::io::File file(temporary.string());
-            file.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
-            file.write({distance, triangle});
+            const core::ScopedCheckedAlignedMemory checked;
+            std::fstream file(temporary, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
+            SeekableArchive archive;
+            archive.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+            archive.write_grids(file, {distance, triangle});
+            make_identity_reproducible(file, info);
             file.close();
+            if (!file) throw std::runtime_error("not all bytes could be written; the disk may be full");
         } catch (const std::bad_alloc&) {
             throw;
         } catch (const std::exception& error) {
             throw core::InputError(core::ErrorKind::kInputOutput,
                                    fmt::format("'{}': cannot be written ({})", path.string(), error.what()));
         }
-        make_identity_reproducible(temporary, info);
     });
 }
 

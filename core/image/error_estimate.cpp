@@ -11,15 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/image/z_test.h"
-
 namespace core {
 
 namespace {
 
 constexpr double kFloor = 0.01;  ///< Added to squares of the reference, as in relMSE.
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using Colors = std::vector<glm::vec3>;
 
@@ -38,75 +35,17 @@ Colors variance_of(const Image& image, const char* role) {
     return std::move(*variance);
 }
 
-/// What |t| exceeds with a probability of 5 %.
-double student_t_95(double degrees_of_freedom) {
-    double low = 0.0, high = 16.0;  // 12.71 at one degree of freedom, and less beyond.
-    for (int i = 0; i < 60; ++i) {
-        const double middle = 0.5 * (low + high);
-        (student_t_p_value(middle, degrees_of_freedom) > 0.05 ? low : high) = middle;
-    }
-    return low;
-}
-
-ErrorInterval around(double value, double standard_error, double degrees_of_freedom) {
-    if (!std::isfinite(value) || !std::isfinite(standard_error)) return {kNaN, kNaN, kNaN};
-    const double half_width = student_t_95(degrees_of_freedom) * standard_error;
-    return {value, value - half_width, value + half_width};
-}
-
-/// Standard error from estimates that each leave one part out.
-double jackknife_error(const std::vector<double>& estimates) {
-    const double count = static_cast<double>(estimates.size());
-    double mean = 0.0, squares = 0.0;
-    for (const double estimate : estimates) mean += estimate / count;
-    for (const double estimate : estimates) squares += (estimate - mean) * (estimate - mean);
-    return std::sqrt((count - 1.0) / count * squares);
-}
-
-/// Square blocks that cover a picture, smaller at the right and lower edge.
-struct Blocks {
-    int width, size, columns, count;
-
-    Blocks(int picture_width, int picture_height) : width(picture_width) {
-        constexpr int kLargest = 16, kEnough = 32;
-        for (size = kLargest;; size /= 2) {
-            columns = (picture_width + size - 1) / size;
-            count = columns * ((picture_height + size - 1) / size);
-            if (count >= kEnough || size == 1) break;
-        }
-    }
-
-    std::size_t of(std::size_t pixel) const {
-        const int x = static_cast<int>(pixel % static_cast<std::size_t>(width));
-        const int y = static_cast<int>(pixel / static_cast<std::size_t>(width));
-        return static_cast<std::size_t>(y / size * columns + x / size);
-    }
-};
-
-/// Mean over pixels, and its interval over blocks. @param value mean over the channels of a pixel
+/// @param value mean over the channels of a pixel
 template <typename Value>
-ErrorInterval mean_over_pixels(const Image& picture, const Value& value) {
-    const Blocks blocks(picture.width(), picture.height());
-    const auto block_count = static_cast<std::size_t>(blocks.count);
-    std::vector<double> sums(block_count, 0.0), counts(block_count, 0.0);
+BlockErrors over_blocks(const Image& picture, const Value& value) {
+    const PixelBlocks blocks(picture.width(), picture.height());
+    BlockErrors errors(blocks);
     for (std::size_t pixel = 0; pixel < picture.pixel_count(); ++pixel) {
         const std::size_t block = blocks.of(pixel);
-        sums[block] += value(pixel);
-        counts[block] += 1.0;
+        errors.sums[block] += value(pixel);
+        errors.pixels[block] += 1.0;
     }
-    double sum = 0.0, count = 0.0;
-    for (std::size_t block = 0; block < block_count; ++block) {
-        sum += sums[block];
-        count += counts[block];
-    }
-    if (block_count == 1)
-        return std::isfinite(sum) ? ErrorInterval{sum, -kInfinity, kInfinity}
-                                  : ErrorInterval{kNaN, kNaN, kNaN};
-    std::vector<double> without(block_count);
-    for (std::size_t block = 0; block < block_count; ++block) {
-        without[block] = (sum - sums[block]) / (count - counts[block]);
-    }
-    return around(sum / count, jackknife_error(without), static_cast<double>(block_count - 1));
+    return errors;
 }
 
 enum class Scale { kAbsolute, kRelative };
@@ -126,11 +65,11 @@ double without_reference_noise(Scale scale, double square, double difference, do
 }
 
 /// Mean of (I - R)^2 - s_R^2 (- s_I^2, where `test_variance` is not empty).
-ErrorInterval corrected(const Image& test, const Image& reference, Scale scale, const Colors& test_variance) {
+BlockErrors corrected(const Image& test, const Image& reference, Scale scale, const Colors& test_variance) {
     assert(test.width() == reference.width() && test.height() == reference.height());
     const Colors values = beauty_of(test), truth = beauty_of(reference),
                  variance = variance_of(reference, "reference");
-    return mean_over_pixels(reference, [&](std::size_t pixel) {
+    return over_blocks(reference, [&](std::size_t pixel) {
         double sum = 0.0;
         for (int i = 0; i < 3; ++i) {
             const double difference = static_cast<double>(values[pixel][i]) - truth[pixel][i];
@@ -158,7 +97,7 @@ ErrorInterval squared_bias(std::span<const Image> runs, const Image& reference, 
     }
     const double count = static_cast<double>(runs.size());
     std::vector<double> without(runs.size(), 0.0);
-    const ErrorInterval over_pixels = mean_over_pixels(reference, [&](std::size_t pixel) {
+    const BlockErrors blocks = over_blocks(reference, [&](std::size_t pixel) {
         double result = 0.0;
         for (int i = 0; i < 3; ++i) {
             double sum = 0.0, squares = 0.0;
@@ -182,8 +121,10 @@ ErrorInterval squared_bias(std::span<const Image> runs, const Image& reference, 
         }
         return result;
     });
+    const ErrorInterval over_pixels = mean_error(blocks);
     for (double& estimate : without) estimate /= static_cast<double>(reference.pixel_count());
-    const ErrorInterval over_runs = around(over_pixels.value, jackknife_error(without), count - 1.0);
+    const ErrorInterval over_runs =
+        student_interval(over_pixels.value, jackknife_error(without), count - 1.0);
     return {over_pixels.value, std::min(over_pixels.low, over_runs.low),
             std::max(over_pixels.high, over_runs.high)};
 }
@@ -258,15 +199,19 @@ LineFit fit_relative(std::span<const double> rates, std::span<const double> erro
 }  // namespace
 
 ErrorInterval corrected_mse(const Image& test, const Image& reference) {
-    return corrected(test, reference, Scale::kAbsolute, {});
+    return mean_error(corrected(test, reference, Scale::kAbsolute, {}));
 }
 
-ErrorInterval corrected_rel_mse(const Image& test, const Image& reference) {
+BlockErrors corrected_rel_mse_blocks(const Image& test, const Image& reference) {
     return corrected(test, reference, Scale::kRelative, {});
 }
 
+ErrorInterval corrected_rel_mse(const Image& test, const Image& reference) {
+    return mean_error(corrected_rel_mse_blocks(test, reference));
+}
+
 ErrorInterval corrected_rel_bias(const Image& test, const Image& reference) {
-    return corrected(test, reference, Scale::kRelative, variance_of(test, "picture under test"));
+    return mean_error(corrected(test, reference, Scale::kRelative, variance_of(test, "picture under test")));
 }
 
 double noise_rel_mse(const Image& picture) {
@@ -302,14 +247,14 @@ std::optional<ErrorFit> fit_error_over_time(std::span<const double> seconds, std
     for (const double time : seconds) rates.push_back(1.0 / time);
     const double points = static_cast<double>(rates.size());
     const LineFit free = fit_relative(rates, errors, {true, true});
-    ErrorFit fit{not_negative(around(free.floor, free.floor_error, points - 2.0)),
-                 not_negative(around(free.slope, free.slope_error, points - 2.0))};
+    ErrorFit fit{not_negative(student_interval(free.floor, free.floor_error, points - 2.0)),
+                 not_negative(student_interval(free.slope, free.slope_error, points - 2.0))};
     if (free.floor < 0.0) {
         const LineFit slope_alone = fit_relative(rates, errors, {false, true});
-        fit.slope = not_negative(around(slope_alone.slope, slope_alone.slope_error, points - 1.0));
+        fit.slope = not_negative(student_interval(slope_alone.slope, slope_alone.slope_error, points - 1.0));
     } else if (free.slope < 0.0) {
         const LineFit floor_alone = fit_relative(rates, errors, {true, false});
-        fit.floor = not_negative(around(floor_alone.floor, floor_alone.floor_error, points - 1.0));
+        fit.floor = not_negative(student_interval(floor_alone.floor, floor_alone.floor_error, points - 1.0));
     }
     return fit;
 }

@@ -5,10 +5,7 @@
 // term g(R) that is s^2 g''(R) / 2. What is left is of fourth order in that noise. Results are not clamped:
 // near zero they may be negative.
 //
-// Intervals over pixels: delete-one jackknife over blocks of 16 x 16 pixels (halved until there are 32 blocks
-// or the blocks are pixels), Student's t. It holds for noise that is independent between blocks, and counts
-// the variation of the error over the picture as uncertainty too, so that it is rather too wide. See Efron,
-// "The Jackknife, the Bootstrap and Other Resampling Plans", SIAM 1982.
+// Intervals over pixels are those of core/image/block_errors.h.
 //
 // I is the picture under test, R the reference, s^2 `Variance.R`, `.G`, `.B`: the variance of a pixel's mean.
 // Means run over pixels and channels. All results are NaN where a value is not finite; the interval of a
@@ -18,16 +15,11 @@
 #include <optional>
 #include <span>
 
+#include "core/image/block_errors.h"
+#include "core/image/error_interval.h"
 #include "core/image/image.h"
 
 namespace core {
-
-/// A value and the interval that holds the truth in 95 % of repetitions.
-struct ErrorInterval {
-    double value = 0.0;
-    double low = 0.0;
-    double high = 0.0;
-};
 
 /// MSE of the test against the truth, the test's own noise included: mean of (I - R)^2 - s_R^2.
 /// @pre equal sizes; both have R, G, B. @throws std::invalid_argument where the reference has no variance
@@ -35,6 +27,10 @@ ErrorInterval corrected_mse(const Image& test, const Image& reference);
 
 /// The same for relMSE: mean of [(I - R)^2 - s_R^2] / (R^2 + 0.01), the denominator's noise removed.
 ErrorInterval corrected_rel_mse(const Image& test, const Image& reference);
+
+/// What corrected_rel_mse is the mean of, over blocks of pixels: pairs with another picture's against the
+/// same reference, see paired_difference.
+BlockErrors corrected_rel_mse_blocks(const Image& test, const Image& reference);
 
 /// relMSE of what the test converges to: mean of [(I - R)^2 - s_R^2 - s_I^2] / (R^2 + 0.01).
 /// @throws std::invalid_argument where either has no variance

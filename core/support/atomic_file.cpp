@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <climits>
 #include <cstdio>
 #include <string>
 #include <system_error>
@@ -71,10 +73,14 @@ private:
 
 /// The file that will be replaced: links are followed, so that they stay links.
 fs::path resolve_destination(const fs::path& path) {
+    if (path.filename().empty() || path.filename() == "." || path.filename() == "..") {
+        throw InputError(ErrorKind::kCannotCreate,
+                         fmt::format("'{}': names a folder; a file name is needed", path.string()));
+    }
     std::error_code error;
     const fs::file_status link = fs::symlink_status(path, error);
     if (!fs::exists(link)) return path;
-    const fs::path target = fs::is_symlink(link) ? fs::canonical(path, error) : path;
+    fs::path target = fs::is_symlink(link) ? fs::canonical(path, error) : path;
     if (error) {
         throw InputError(ErrorKind::kCannotCreate, fmt::format("'{}': cannot write through this link: {}",
                                                                path.string(), error.message()));
@@ -94,19 +100,42 @@ fs::path create_temporary(const fs::path& path, const fs::path& target) {
     while (true) {
         const std::string name = fmt::format(".{}.{}-{}{}", target.stem().string(), ::getpid(), counter++,
                                              target.extension().string());
-        const fs::path temporary = target.parent_path() / name;
+        fs::path temporary = target.parent_path() / name;
         const Descriptor created(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
         if (created.is_open()) return temporary;
         if (errno != EEXIST) fail(path, "create a file in this folder", errno);
     }
 }
 
+/// The path of a temporary file that is being written, where remove_temporary_files finds it.
+struct TemporarySlot {
+    std::atomic<bool> taken{false};  ///< By a guard, which alone writes the path.
+    std::atomic<bool> is_set{false};
+    std::array<char, PATH_MAX> path{};
+};
+
+/// As many as there may be writers at a time; a file beyond is written all the same.
+std::array<TemporarySlot, 64> temporary_slots;
+
 /// Removes the temporary file unless it has become the real one.
 class TemporaryGuard {
 public:
-    explicit TemporaryGuard(const fs::path& temporary) : temporary_(temporary) {}
+    explicit TemporaryGuard(const fs::path& temporary) : temporary_(temporary) {
+        if (temporary.native().size() >= PATH_MAX) return;
+        for (TemporarySlot& slot : temporary_slots) {
+            if (slot.taken.exchange(true)) continue;
+            temporary.native().copy(slot.path.data(), PATH_MAX - 1);
+            slot.path[temporary.native().size()] = '\0';
+            slot.is_set = true;
+            slot_ = &slot;
+            return;
+        }
+    }
     ~TemporaryGuard() {
         if (!renamed_) ::unlink(temporary_.c_str());
+        if (!slot_) return;
+        slot_->is_set = false;
+        slot_->taken = false;
     }
     TemporaryGuard(const TemporaryGuard&) = delete;
     TemporaryGuard& operator=(const TemporaryGuard&) = delete;
@@ -115,6 +144,7 @@ public:
 
 private:
     const fs::path& temporary_;
+    TemporarySlot* slot_ = nullptr;
     bool renamed_ = false;
 };
 
@@ -151,10 +181,6 @@ void write_all(const fs::path& path, const fs::path& temporary, std::string_view
 }  // namespace
 
 void write_file_atomically(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-    if (path.filename().empty() || path.filename() == "." || path.filename() == "..") {
-        throw InputError(ErrorKind::kCannotCreate,
-                         fmt::format("'{}': names a folder; a file name is needed", path.string()));
-    }
     const fs::path target = resolve_destination(path);
     const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
     const fs::path temporary = create_temporary(path, target);
@@ -174,6 +200,17 @@ void write_file_atomically(const fs::path& path, const std::function<void(const 
     if (::rename(temporary.c_str(), target.c_str()) != 0) fail(path, "put the finished file in place", errno);
     guard.set_renamed();
     flush_folder(path, folder);
+}
+
+void require_place_for_file(const fs::path& path) {
+    const fs::path temporary = create_temporary(path, resolve_destination(path));
+    const TemporaryGuard guard(temporary);
+}
+
+void remove_temporary_files() noexcept {
+    for (const TemporarySlot& slot : temporary_slots) {
+        if (slot.is_set) ::unlink(slot.path.data());
+    }
 }
 
 void write_text_atomically(const fs::path& path, std::string_view text) {

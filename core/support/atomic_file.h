@@ -15,7 +15,16 @@ namespace core {
 void write_file_atomically(const std::filesystem::path& path,
                            const std::function<void(const std::filesystem::path& temporary)>& write);
 
-/// The same for text that is at hand.
+/// Fails now where write_file_atomically could not begin: before long work, whose result would have no place.
+/// Makes a temporary file and removes it.
+/// @throws InputError as write_file_atomically does
+void require_place_for_file(const std::filesystem::path& path);
+
+/// Removes the temporary files that are being written, where the program must end without unwinding. Takes no
+/// memory.
+void remove_temporary_files() noexcept;
+
+/// write_file_atomically for text that is at hand.
 void write_text_atomically(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace core

@@ -5,8 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
+#include <new>
+#include <utility>
 
 #include "core/support/error.h"
 
@@ -53,7 +57,34 @@ std::string mebibytes(std::uint64_t bytes, bool round_up) {
     return fmt::format("{} MiB", (bytes >> 20) + (round_up && bytes % (1 << 20) != 0 ? 1 : 0));
 }
 
+thread_local bool aligned_memory_is_checked = false;
+
 }  // namespace
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+// Takes the place of the C library's posix_memalign, for shared libraries as well. Under a name of its own in
+// C++, since the C library's header promises that posix_memalign throws nothing.
+extern "C" int checked_posix_memalign(void** memory, std::size_t alignment,
+                                      std::size_t bytes) __asm__("posix_memalign");
+
+extern "C" int checked_posix_memalign(void** memory, std::size_t alignment, std::size_t bytes) {
+    if (alignment == 0 || (alignment & (alignment - 1)) != 0 || alignment % sizeof(void*) != 0) return EINVAL;
+    void* const taken = std::aligned_alloc(alignment, bytes);
+    if (!taken && aligned_memory_is_checked) throw std::bad_alloc();
+    if (!taken) return ENOMEM;
+    *memory = taken;
+    return 0;
+}
+
+#endif
+
+ScopedCheckedAlignedMemory::ScopedCheckedAlignedMemory()
+    : previous_(std::exchange(aligned_memory_is_checked, true)) {}
+
+ScopedCheckedAlignedMemory::~ScopedCheckedAlignedMemory() {
+    aligned_memory_is_checked = previous_;
+}
 
 void limit_memory(std::uint64_t bytes) {
     if (kReservesMemory) {

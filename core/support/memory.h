@@ -18,6 +18,21 @@ void limit_memory(std::uint64_t bytes);
 /// Opens the limit again, as far as the system lets, so that there is room to say that it was met.
 void lift_memory_limit() noexcept;
 
+/// While it lives, aligned memory that its thread asks for and does not get ends in std::bad_alloc, where
+/// posix_memalign would return an error. For C libraries that do not look: Blosc 1.21, by which OpenVDB packs
+/// its leaves, writes through the null pointer. Nothing changes in builds with a sanitizer, which cannot run
+/// under a limit and replaces posix_memalign itself.
+class ScopedCheckedAlignedMemory {
+public:
+    ScopedCheckedAlignedMemory();
+    ~ScopedCheckedAlignedMemory();
+    ScopedCheckedAlignedMemory(const ScopedCheckedAlignedMemory&) = delete;
+    ScopedCheckedAlignedMemory& operator=(const ScopedCheckedAlignedMemory&) = delete;
+
+private:
+    bool previous_;
+};
+
 /// Whether a limit was set, here or by whoever started the program (ulimit).
 bool memory_is_limited();
 

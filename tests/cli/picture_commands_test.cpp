@@ -227,7 +227,6 @@ TEST_F(PictureCommands, CompareWritesTheFlipMap) {
     EXPECT_GT(pixel(70)[0], 150);
     EXPECT_EQ(pixel(39), (std::array<int, 3>{255, 0, 255}));
     EXPECT_EQ(run({"compare", a, b, "--flip-map", path("map.jpg")}).exit_code, 64);
-    EXPECT_EQ(run({"compare", a, b, "--flip-map", path("missing/map.png")}).exit_code, 73);
 }
 
 TEST_F(PictureCommands, CompareFailsAnyNonfinitePixelAndSaysSo) {
@@ -297,8 +296,6 @@ TEST_F(PictureCommands, ConvertRefusesByName) {
     EXPECT_EQ(run({"convert", a, path("a.png"), "--exposure", "bright"}).exit_code, 64);
     EXPECT_EQ(run({"convert", a, path("a.png"), "--exposure", "nan"}).exit_code, 64);
     EXPECT_EQ(run({"convert", a, path("a.png"), "--tone-map", "filmic"}).exit_code, 64);
-    EXPECT_EQ(run({"convert", a, path("missing/a.png")}).exit_code, 73);
-    EXPECT_EQ(run({"convert", path("missing.exr"), path("a.png")}).exit_code, 66);
     EXPECT_FALSE(fs::exists(path("a.png")));
 }
 

@@ -57,6 +57,8 @@ cli::Report sample_report() {
     series.points = {point, point};
     series.points[1].pareto = false;
     report.series = {series};
+    report.paired = {{"triangles", series.method, {0.5, 0.25, 0.75}, true}};
+    report.winner = "triangles";
     report.pictures.push_back({"reference", "pictures/reference.exr", {glm::vec3(1.0f)}, {}, {}, {}});
     return report;
 }
@@ -93,6 +95,12 @@ TEST(ReportFiles, JsonHoldsTheKeysThatScriptsRelyOn) {
         EXPECT_TRUE(point.contains(key)) << key;
     }
     EXPECT_TRUE(point.at("metrics").at("flip").is_null());
+    EXPECT_TRUE(point.at("metrics").at("percentiles").contains("99.9"));
+    EXPECT_FALSE(point.at("metrics").contains("ssim")) << "that is of two pictures alone";
+    EXPECT_EQ(json.at("winner"), "triangles");
+    EXPECT_EQ(json.at("paired").at(0).at("worse"), "fields \"64\", coarse");
+    EXPECT_EQ(json.at("paired").at(0).at("rel_mse_difference").at("low"), 0.25);
+    EXPECT_EQ(json.at("paired").at(0).at("decided"), true);
     ASSERT_EQ(json.at("pareto").size(), 1u);
     EXPECT_EQ(json.at("pareto").at(0).at("samples_per_pixel"), 4);
     EXPECT_EQ(json.at("pictures").at(0).at("exr"), "pictures/reference.exr");

@@ -288,6 +288,36 @@ TEST(ReportPage, NamesNoWinnerWhereIntervalsOverlap) {
     EXPECT_EQ(count(cli::report_html(report), " best\""), 1u);
 }
 
+TEST(ReportPage, MarksTheWinnerOfThePairsAndSaysHowTheyAreDecided) {
+    cli::Report report = tests::sample_report();
+    for (cli::ReportSeries& series : report.series) {
+        series.floor = series.variance_seconds = series.seconds_to_5_percent = {};
+    }
+    EXPECT_EQ(count(cli::report_html(report), " best\""), 0u) << "overlapping or not: pairs decide";
+    report.winner = "triangles";
+    const std::string html = cli::report_html(report);
+    EXPECT_EQ(count(html, " best\""), 1u);
+    EXPECT_NE(html.find("<dt>Paired, winner</dt>"), std::string::npos);
+    EXPECT_EQ(count(html, "paired 95 % intervals"), 1u);
+    report.paired.clear();
+    EXPECT_EQ(count(cli::report_html(report), "paired 95 % intervals"), 0u);
+}
+
+TEST(ReportPage, ShowsSeedsMemoryAndWhatTheReferenceCost) {
+    cli::Report report = tests::sample_report();
+    std::string html = cli::report_html(report);
+    EXPECT_NE(html.find("<dt>Seed of the reference</dt><dd>1000010</dd>"), std::string::npos);
+    EXPECT_NE(html.find("<dt>Most memory held</dt><dd>765 MB</dd>"), std::string::npos);
+    EXPECT_NE(html.find("4,096 samples a pixel, 91.5 s<"), std::string::npos);
+    EXPECT_EQ(count(html, ">7016<"), 2u) << "one a series with 16 samples";
+    report.reference_reused = true;
+    report.reference_seconds = 0.0;
+    EXPECT_NE(cli::report_html(report).find("reused from an earlier run, which did not record its time"),
+              std::string::npos);
+    report.reference_render_seconds = 91.5;
+    EXPECT_NE(cli::report_html(report).find("91.5 s in an earlier run, reused"), std::string::npos);
+}
+
 /// Heights of the names at the ends of the lines, ascending.
 std::vector<double> label_heights(const std::string& svg) {
     std::vector<double> heights;

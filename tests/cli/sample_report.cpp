@@ -36,6 +36,7 @@ std::vector<glm::vec3> radiance(int width, int height, float factor) {
 cli::ReportPoint point(int samples, double seconds, double rel_mse, const std::string& command) {
     cli::ReportPoint result;
     result.samples_per_pixel = samples;
+    result.seed = 7000 + static_cast<std::uint64_t>(samples);
     result.seconds = seconds;
     result.cpu_seconds = 1.9 * seconds;
     result.rays = static_cast<std::uint64_t>(samples) * 432'100u;
@@ -121,6 +122,10 @@ cli::Report sample_report() {
     report.reference_rel_variance = 1e-6;
     report.reference_command = "fieldlight render room.glb --spp 4096";
     report.equal_seconds = 3.0;
+    report.reference_seed = 1'000'010;
+    report.peak_bytes = 765'432'100;
+    report.paired = {{"triangles", "fields 128", {0.0071, 0.0065, 0.0077}, true},
+                     {"triangles", kHostileText, {0.002, -0.011, 0.015}, false}};
     report.verdict = "Fields need 3.1 times as long as triangles to come within 5 % of the reference.";
     report.warnings = {kHostileText, "the second warning"};
 

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -13,7 +17,25 @@ using cli::Report;
 using cli::ReportPoint;
 using cli::ReportSeries;
 
-/// Rungs of 1, 2, 4, ... samples with relMSE = floor + slope / seconds and an interval of +- `spread` of it.
+/// Blocks of a pixel each whose mean is `error`, with noise that is common to all methods of a report, and
+/// far larger than the error, and noise of +- `spread` of the error that is `owner`'s alone.
+core::BlockErrors blocks_of(double error, double spread, const std::string& owner) {
+    core::BlockErrors blocks(core::PixelBlocks(48, 48));
+    std::mt19937 common(1), own(static_cast<std::uint32_t>(std::hash<std::string>()(owner)));
+    std::normal_distribution<double> normal;
+    const double root = std::sqrt(static_cast<double>(blocks.sums.size()));
+    double off = 0.0;
+    for (double& sum : blocks.sums) {
+        sum = spread * error * root * normal(own);
+        off += sum / static_cast<double>(blocks.sums.size());
+    }
+    for (double& sum : blocks.sums) sum += error - off + 100.0 * normal(common);
+    blocks.pixels.assign(blocks.sums.size(), 1.0);
+    return blocks;
+}
+
+/// Rungs of 1, 2, 4, ... samples with relMSE = floor + slope / seconds and an interval of +- `spread` of it;
+/// so is, about, that of paired differences.
 ReportSeries series(const std::string& method, int resolution, int rungs, double seconds_per_sample,
                     double floor, double slope, double spread = 0.01) {
     ReportSeries result;
@@ -25,6 +47,8 @@ ReportSeries series(const std::string& method, int resolution, int rungs, double
         point.seconds = seconds_per_sample * point.samples_per_pixel;
         const double error = floor + slope / point.seconds;
         point.rel_mse = {error, (1.0 - spread) * error, (1.0 + spread) * error};
+        point.seed = static_cast<std::uint64_t>(i);
+        point.blocks = blocks_of(error, 0.5 * spread, method + std::to_string(i));
         result.points.push_back(point);
     }
     return result;
@@ -47,6 +71,7 @@ TEST(Verdict, MarksThePointsThatNothingBeats) {
         ReportPoint point;
         point.seconds = seconds;
         point.rel_mse.value = error;
+        point.blocks = blocks_of(error, 0.01, "any");
         return point;
     };
     ReportSeries a, b;
@@ -103,23 +128,55 @@ TEST(Verdict, NamesTheWinnerAtEqualTimeAndTheFloorOfTheFinestFields) {
     EXPECT_NEAR(fine.seconds_to_5_percent->value, 0.03 / 0.0015, 1e-6);
     EXPECT_FALSE(coarse.seconds_to_5_percent) << "its floor forbids it";
     EXPECT_TRUE(contains(report.verdict, "the least error is that of triangles")) << report.verdict;
-    EXPECT_TRUE(contains(report.verdict, "fields 128, the next best")) << report.verdict;
+    EXPECT_TRUE(contains(report.verdict, "] (fields 128), ")) << report.verdict;
+    EXPECT_EQ(report.winner, "triangles");
+    ASSERT_EQ(report.paired.size(), 3u);
+    const cli::PairedComparison& closest = report.paired.front();
+    EXPECT_EQ(closest.better, "triangles");
+    EXPECT_EQ(closest.worse, "fields 128");
+    EXPECT_TRUE(closest.decided);
+    EXPECT_NEAR(closest.difference.value,
+                fine.rel_mse_at_equal_time->value - triangles.rel_mse_at_equal_time->value, 1e-9)
+        << "a pair's difference is that of the table";
     EXPECT_TRUE(contains(report.verdict, "no time brings fields 128 below a relMSE of 0.001"))
         << report.verdict;
     EXPECT_TRUE(report.warnings.empty());
 }
 
-TEST(Verdict, KnowsNoWinnerWhereIntervalsOverlap) {
+TEST(Verdict, DecidesInPairsWhatSingleIntervalsCannot) {
+    Report report = report_of({series("triangles", 0, 5, 0.1, 0.0, 0.010, 0.01),
+                               series("fields 64", 64, 5, 0.1, 0.0, 0.011, 0.01)});
+    for (ReportSeries& one : report.series) {
+        for (ReportPoint& point : one.points) point.rel_mse.low = -1.0, point.rel_mse.high = 1.0;
+    }
+    cli::judge(report);
+    EXPECT_EQ(report.winner, "triangles") << report.verdict;
+    EXPECT_TRUE(contains(report.verdict, "the least error is that of triangles")) << report.verdict;
+    EXPECT_EQ(report.series[0].rel_mse_at_equal_time->high, 1.0) << "the table keeps its intervals";
+}
+
+TEST(Verdict, KnowsNoWinnerWherePairsCannotTell) {
     Report report = report_of({series("triangles", 0, 5, 0.1, 0.0, 0.010, 0.2),
-                               series("fields 64", 64, 5, 0.1, 0.0, 0.011, 0.2),
+                               series("fields 64", 64, 5, 0.1, 0.0, 0.0105, 0.2),
                                series("fields 128", 128, 5, 0.1, 0.0, 0.100, 0.2)});
     cli::judge(report);
+    EXPECT_EQ(report.winner, "");
     EXPECT_TRUE(contains(report.verdict, "there is no winner")) << report.verdict;
-    EXPECT_TRUE(contains(report.verdict, "triangles at")) << report.verdict;
-    EXPECT_TRUE(contains(report.verdict, "fields 64 at")) << report.verdict;
-    EXPECT_FALSE(contains(report.verdict, "fields 128 at")) << "that one has lost: " << report.verdict;
+    EXPECT_TRUE(contains(report.verdict, "triangles came to")) << report.verdict;
+    EXPECT_TRUE(contains(report.verdict, "0.000312 [-")) << report.verdict;
+    EXPECT_TRUE(contains(report.verdict, "] (fields 64); ")) << report.verdict;
+    EXPECT_FALSE(contains(report.verdict, "(fields 128)")) << "that one has lost: " << report.verdict;
     EXPECT_FALSE(contains(report.verdict, "least error")) << report.verdict;
     EXPECT_TRUE(contains(report.verdict, "cannot be told from 0")) << report.verdict;
+}
+
+TEST(Verdict, CallsEqualsATie) {
+    Report report =
+        report_of({series("triangles", 0, 3, 0.1, 0.0, 0.01), series("fields 64", 64, 3, 0.1, 0.0, 0.01)});
+    report.series[1].points = report.series[0].points;
+    cli::judge(report);
+    EXPECT_EQ(report.winner, "");
+    EXPECT_FALSE(report.paired.at(0).decided);
 }
 
 TEST(Verdict, FitsNothingToTwoRungs) {

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
 #include <random>
 #include <thread>
+
+#include "tests/support/folder_events.h"
 
 namespace tests {
 
@@ -39,31 +42,75 @@ void sweep_memory(const std::vector<std::string>& arguments, const fs::path& out
     EXPECT_TRUE(fs::exists(output)) << "the largest limit was not enough";
 }
 
-int kill_at_random_points(const std::function<std::vector<std::string>(int)>& arguments,
-                          const fs::path& output, int count,
-                          const std::function<bool(const fs::path&)>& is_whole) {
-    const ProgramRun first = run_program(arguments(0));
-    EXPECT_EQ(first.exit_code, 0) << first.err;
-    EXPECT_TRUE(is_whole(output));
+namespace {
+
+/// Runs a verb with a watcher beside it, and returns how many events there were.
+int count_events(const Workplace& place) {
+    FolderEvents events(place.path("out"));
+    EXPECT_NE(place.run().exit_code, -1);
+    int count = 0;
+    while (true) {
+        const auto found = static_cast<int>(events.wait(std::chrono::milliseconds(0)).size());
+        if (found == 0) return count;
+        count += found;
+    }
+}
+
+/// Waits until `count` things happened to the files that are watched, or for `longest`.
+void wait_for_events(FolderEvents& events, int count, std::chrono::milliseconds longest) {
+    const auto end = std::chrono::steady_clock::now() + longest;
+    while (count > 0) {
+        const auto left =
+            std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+        if (left.count() <= 0) return;
+        count -= static_cast<int>(events.wait(left).size());
+    }
+}
+
+}  // namespace
+
+KillCounts kill_at_random_points(const WritingVerb& verb, int count) {
+    const Workplace place(verb);
+    const int event_count = count_events(place);
+    place.put_old_files();
+    const ProgramRun whole = place.run();
+    EXPECT_EQ(whole.exit_code, verb.exit_code) << whole.err;
+    const std::chrono::milliseconds longest(static_cast<int>(4000 * whole.seconds) + 200);
     std::mt19937 random(7);
-    int killed = 0;
-    for (int i = 1; i <= count; ++i) {
-        const double moment = first.seconds * std::uniform_real_distribution<double>(0.5, 1.05)(random);
+    KillCounts counts;
+    for (int i = 0; i < count; ++i) {
+        place.put_old_files();
+        FolderEvents events(place.path("out"));
+        const std::size_t left_before = temporary_file_count(place.path("out"));
+        const int wanted = std::uniform_int_distribution<int>(1, std::max(1, event_count))(random);
+        const std::chrono::duration<double> moment(
+            std::uniform_real_distribution<double>(0.0, 1.05 * whole.seconds)(random));
         RunConditions conditions;
-        conditions.while_running = [moment](pid_t process) {
-            std::this_thread::sleep_for(std::chrono::duration<double>(moment));
+        conditions.while_running = [&](pid_t process) {
+            if (i % 2 == 0) {
+                wait_for_events(events, wanted, longest);
+            } else {
+                std::this_thread::sleep_for(moment);
+            }
             kill(process, SIGKILL);
         };
-        killed += run_program(arguments(i), conditions).signal == SIGKILL;
-        EXPECT_TRUE(is_whole(output)) << "after attempt " << i << ", killed at " << moment << " s";
+        const ProgramRun run = place.run(conditions);
+        counts.killed += run.signal == SIGKILL;
+        counts.in_writing += temporary_file_count(place.path("out")) > left_before;
+        SCOPED_TRACE(verb.name + ", attempt " + std::to_string(i));
+        EXPECT_TRUE(run.signal == SIGKILL || run.exit_code == verb.exit_code) << run.err;
+        expect_old_or_whole(place, /*may_leave_temporary=*/true);
     }
-    return killed;
+    const ProgramRun last = place.run();
+    EXPECT_EQ(last.exit_code, verb.exit_code) << last.err;
+    for (const std::string& file : place.files()) EXPECT_TRUE(is_whole(place.path(file))) << file;
+    return counts;
 }
 
 std::size_t temporary_file_count(const fs::path& folder) {
     std::size_t count = 0;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
-        count += entry.is_regular_file() && entry.path().filename().string().starts_with(".");
+        count += entry.is_regular_file() && is_temporary(entry.path());
     }
     return count;
 }

@@ -3,11 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "tests/support/program_run.h"
+#include "tests/support/writing_verbs.h"
 
 namespace tests {
 
@@ -20,14 +20,17 @@ void expect_clear_end(const ProgramRun& run, const std::string& what);
 void sweep_memory(const std::vector<std::string>& arguments, const std::filesystem::path& output,
                   std::uint64_t step_bytes);
 
-/// Runs a verb that writes `output` once to the end, then `count` times with SIGKILL at a random moment of
-/// that time, and expects that `output` is each time the old or the new file and `is_whole`. Kills that come
-/// while the file is written are what counts, so the moments lie in the last part of the run.
-/// @param arguments for attempt number i; they may ask for another content each time
-/// @returns how many runs were killed before they ended
-int kill_at_random_points(const std::function<std::vector<std::string>(int)>& arguments,
-                          const std::filesystem::path& output, int count,
-                          const std::function<bool(const std::filesystem::path&)>& is_whole);
+/// What became of runs that were to be killed.
+struct KillCounts {
+    int killed = 0;      ///< Runs that had not ended before.
+    int in_writing = 0;  ///< Of these, such as left a temporary file: they were killed while they wrote.
+};
+
+/// Runs a verb `count` times and ends each run by SIGKILL: every other one at a random moment of its time,
+/// the rest after a random one of the things that happen to its files. Expects each time that every file is
+/// the old one or a whole new one, and at last that a run left alone succeeds, whatever the killed ones left
+/// over.
+KillCounts kill_at_random_points(const WritingVerb& verb, int count);
 
 /// Files in a folder that the program made as temporary ones, by their leading dot.
 std::size_t temporary_file_count(const std::filesystem::path& folder);

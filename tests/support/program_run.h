@@ -17,9 +17,10 @@ struct RunConditions {
     std::optional<std::uint64_t> data_bytes = {};           ///< RLIMIT_DATA.
     std::optional<std::uint64_t> address_space_bytes = {};  ///< RLIMIT_AS.
     std::optional<std::uint64_t> file_bytes = {};           ///< RLIMIT_FSIZE.
-    std::filesystem::path stdout_file = {};                 ///< Where stdout goes, if not into `out`.
-    std::filesystem::path folder = {};                      ///< Working folder, if not the test's own.
-    std::function<void(pid_t)> while_running = {};          ///< Called once the process stands.
+    bool obeys_permissions = false;  ///< Even as root, who may otherwise write where the mode forbids it.
+    std::filesystem::path stdout_file = {};         ///< Where stdout goes, if not into `out`.
+    std::filesystem::path folder = {};              ///< Working folder, if not the test's own.
+    std::function<void(pid_t)> while_running = {};  ///< Called once the process stands.
 };
 
 /// What became of a run.
@@ -32,7 +33,7 @@ struct ProgramRun {
     std::uint64_t peak_bytes = 0;  ///< Largest resident set.
 };
 
-/// Runs the built program. Its stdin is empty.
+/// Runs the built program. Its stdin is empty, its stderr a pipe, which no limit on files touches.
 ProgramRun run_program(const std::vector<std::string>& arguments, const RunConditions& conditions = {});
 
 /// Whether this build is sanitized: slower, larger, and unable to run under a limit on memory.

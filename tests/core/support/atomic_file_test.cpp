@@ -174,4 +174,34 @@ TEST(AtomicFile, KilledAtRandomPointsTheFileIsAlwaysWhole) {
     }
 }
 
+TEST(AtomicFile, RemovesWhatIsUnfinishedWhereTheProgramMustEnd) {
+    const tests::TemporaryFolder folder;
+    const fs::path path = folder.path() / "file";
+    core::write_text_atomically(path, "old");
+    const int status = run_in_child([&] {
+        core::write_file_atomically(path, [](const fs::path& temporary) {
+            std::ofstream(temporary) << "half";
+            core::remove_temporary_files();
+            _exit(3);
+        });
+        return 0;
+    });
+    EXPECT_EQ(WEXITSTATUS(status), 3);
+    EXPECT_EQ(content_of(path), "old");
+    EXPECT_EQ(entry_count(folder.path()), 1u);
+}
+
+TEST(AtomicFile, TellsEarlyWhetherThereIsAPlace) {
+    const tests::TemporaryFolder folder;
+    const fs::path path = folder.path() / "file";
+    core::require_place_for_file(path);
+    EXPECT_EQ(entry_count(folder.path()), 0u);
+    core::write_text_atomically(path, "old");
+    core::require_place_for_file(path);
+    EXPECT_EQ(content_of(path), "old");
+    const core::InputError error =
+        error_of([&] { core::require_place_for_file(folder.path() / "missing" / "file"); });
+    EXPECT_EQ(error.kind(), core::ErrorKind::kCannotCreate);
+}
+
 }  // namespace

@@ -6,6 +6,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <new>
@@ -98,6 +101,27 @@ TEST(Memory, LimitsOfTheShellCountToo) {
                        core::ErrorKind::kOutOfMemory;
         }));
     }
+}
+
+#endif
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+TEST(AlignedMemory, EndsInBadAllocOnlyWhereItIsChecked) {
+    // As a C library calls it, whose code does not know that it should throw nothing.
+    int (*volatile take)(void**, std::size_t, std::size_t) = posix_memalign;
+    constexpr std::size_t kTooMuch = std::size_t{1} << 60;
+    void* memory = nullptr;
+    EXPECT_EQ(take(&memory, 64, kTooMuch), ENOMEM);
+    EXPECT_EQ(take(&memory, 3, 8), EINVAL);
+    {
+        const core::ScopedCheckedAlignedMemory checked;
+        EXPECT_THROW(take(&memory, 64, kTooMuch), std::bad_alloc);
+        ASSERT_EQ(take(&memory, 64, 100), 0);
+        EXPECT_EQ(reinterpret_cast<std::uintptr_t>(memory) % 64, 0u);
+        std::free(memory);
+    }
+    EXPECT_EQ(take(&memory, 64, kTooMuch), ENOMEM);
 }
 
 #endif
