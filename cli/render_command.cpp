@@ -110,6 +110,7 @@ void add_render_command(CLI::App& app, Program& program) {
     verb->add_option("--primary", options.primary, "What camera rays meet: triangle (default) or sdf")
         ->transform(CLI::CheckedTransformer(tracers).description(""))
         ->type_name("KIND");
+    add_hit_mode_option(*verb, options.hit_mode);
     verb->add_option("--renderer", flags->renderer, "path: the path tracer")
         ->check(CLI::IsMember({"path", "gather", "irradiance-field", "screen-denoiser", "direct"})
                     .description(""))
