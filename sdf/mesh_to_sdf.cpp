@@ -334,7 +334,11 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
     info.half_thickness = sources.has_sheets || has_thin_walls ? kHalfThicknessVoxels * h : 0.0;
     info.clean_level_set =
         sources.has_solids && !sources.has_sheets && sources.solids_are_closed && !has_thin_walls;
-    info.error_voxels = measure_error(sources.corners, features, *sources.winding, LeafMap(field.leaves));
+    const BakedSurfaces surfaces{sources.corners, features, *sources.solids, *sources.sheets,
+                                 *sources.winding};
+    info.error_voxels = measure_error(surfaces, LeafMap(field.leaves));
+    info.error_field_voxels = measure_field_error(surfaces, field.leaves);
+    info.sign_mismatches = count_sign_mismatches(surfaces, field.leaves);
 
     if (info.half_thickness > 0.0) {
         field.features.assign(mesh.triangles.size(), Feature::kSurface);
