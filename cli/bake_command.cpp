@@ -51,7 +51,7 @@ nlohmann::json as_json(const sdf::MeshBake& bake) {
             {"half_thickness", info.half_thickness},
             {"file", bake.file.string()},
             {"bytes", bake.file_bytes},
-            {"memory_bytes", bake.grid->bytes()},
+            {"memory_bytes", bake.memory_bytes},
             {"seconds", bake.seconds},
             {"reused", bake.reused},
             {"error_voxels", as_json(info.error_voxels)},
@@ -160,7 +160,7 @@ void add_bake_command(CLI::App& app, Program& program) {
         ->capture_default_str();
     verb.add_option(
             "--max-field-bytes", settings.max_field_bytes,
-            "Coarsen any field that would take more memory than this; 0: no limit")
+            "Coarsen any field that would take more memory than this in a tracer, and say so; 0: no limit")
         ->capture_default_str();
     verb.add_flag("--force", settings.force, "Bake even where the folder holds a bake that fits");
     verb.footer(

@@ -109,6 +109,9 @@ core::ExrAttributes picture_attributes(const RenderOptions& options, const core:
         attributes["voxels"] = options.bake.voxel_world
                                    ? fmt::format("{} world units", *options.bake.voxel_world)
                                    : fmt::format("{} on the longest side", options.bake.resolution);
+        if (options.bake.max_field_bytes > 0) {
+            attributes["maxFieldBytes"] = std::to_string(options.bake.max_field_bytes);
+        }
     }
     return attributes;
 }
