@@ -96,7 +96,7 @@ BakedGrid bake_within_limits(const core::Mesh& mesh, double voxel, double longes
     const std::uint64_t limit = settings.max_field_bytes;
     std::string coarsened;  // What the first voxel would have taken.
     for (int attempt = 0;; ++attempt) {
-        BakedGrid baked{bake_mesh(view_of(mesh), {voxel, settings.surface_class}),
+        BakedGrid baked{bake_mesh(view_of(mesh), {voxel, settings.surface_class, settings.max_dimension}),
                         nullptr};
         FieldInfo& info = baked.field.info;
         info.source_hash = key.source_hash;
