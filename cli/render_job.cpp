@@ -180,6 +180,12 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     const double write_seconds = clock.lap();
 
     nlohmann::json statistics = statistics_of(program, options, frame, tracers);
+    statistics["missing_meshes"] = nlohmann::json::array();
+    if (baked) {
+        for (const sdf::MeshBake& mesh : baked->meshes) {
+            if (mesh.error) statistics["missing_meshes"].push_back(mesh.name);
+        }
+    }
     statistics["seconds"] = {{"load", load_seconds},
                              {"bake", bake_seconds},
                              {"build", build_seconds},
