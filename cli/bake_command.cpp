@@ -32,6 +32,10 @@ const std::map<std::string, sdf::ClassOverride>& class_names() {
     return names;
 }
 
+nlohmann::json as_json(const sdf::ErrorFigures& figures) {
+    return {{"mean", figures.mean}, {"p99", figures.p99}, {"max", figures.max}};
+}
+
 nlohmann::json as_json(const sdf::MeshBake& bake) {
     if (!bake.grid) {
         return {{"name", bake.name},
@@ -40,36 +44,42 @@ nlohmann::json as_json(const sdf::MeshBake& bake) {
                 {"error", bake.error ? bake.error->what() : "not baked"}};
     }
     const sdf::FieldInfo& info = bake.info();
-    return {
-        {"name", bake.name},
-        {"triangles", bake.triangle_count},
-        {"class", sdf::class_name(info.mesh_class)},
-        {"voxel", info.voxel_size},
-        {"half_thickness", info.half_thickness},
-        {"file", bake.file.string()},
-        {"bytes", bake.file_bytes},
-        {"memory_bytes", bake.grid->bytes()},
-        {"seconds", bake.seconds},
-        {"reused", bake.reused},
-        {"error_voxels",
-         {{"mean", info.error_voxels.mean}, {"p99", info.error_voxels.p99}, {"max", info.error_voxels.max}}},
-        {"dropped_faces", info.dropped_faces},
-        {"warnings", bake.warnings}};
+    return {{"name", bake.name},
+            {"triangles", bake.triangle_count},
+            {"class", sdf::class_name(info.mesh_class)},
+            {"voxel", info.voxel_size},
+            {"half_thickness", info.half_thickness},
+            {"file", bake.file.string()},
+            {"bytes", bake.file_bytes},
+            {"memory_bytes", bake.memory_bytes},
+            {"seconds", bake.seconds},
+            {"reused", bake.reused},
+            {"error_voxels", as_json(info.error_voxels)},
+            {"error_field_voxels", as_json(info.error_field_voxels)},
+            {"sign_mismatches",
+             {{"samples", info.sign_mismatches.samples}, {"wrong", info.sign_mismatches.wrong}}},
+            {"dropped_faces", info.dropped_faces},
+            {"warnings", bake.warnings}};
 }
 
 std::string table_of(const sdf::BakeResult& result) {
-    std::string text = fmt::format("{:<32}{:>10}{:>7}{:>12}{:>12}{:>9}  {}\n", "mesh", "triangles", "class",
-                                   "voxel", "bytes", "seconds", "error in voxels: mean, p99, max");
+    std::string text =
+        fmt::format("{:<32}{:>10}{:>7}{:>12}{:>12}{:>9}  {:<24}{:<24}{}\n", "mesh", "triangles", "class",
+                    "voxel", "bytes", "seconds", "mesh -> field (voxels)", "field -> mesh", "wrong signs");
     for (const sdf::MeshBake& bake : result.meshes) {
         if (!bake.grid) {
             text += fmt::format("{:<32}{:>10} failed\n", bake.name, bake.triangle_count);
             continue;
         }
         const sdf::FieldInfo& info = bake.info();
-        text += fmt::format("{:<32}{:>10}{:>7}{:>12.5g}{:>12}{:>9.2f}  {:.3f} {:.3f} {:.3f}{}\n", bake.name,
+        const auto figures = [](const sdf::ErrorFigures& f) {
+            return fmt::format("{:.3f} {:.3f} {:.3f}", f.mean, f.p99, f.max);
+        };
+        text += fmt::format("{:<32}{:>10}{:>7}{:>12.5g}{:>12}{:>9.2f}  {:<24}{:<24}{} of {}{}\n", bake.name,
                             bake.triangle_count, sdf::class_name(info.mesh_class), info.voxel_size,
-                            bake.file_bytes, bake.seconds, info.error_voxels.mean, info.error_voxels.p99,
-                            info.error_voxels.max, bake.reused ? "  (reused)" : "");
+                            bake.file_bytes, bake.seconds, figures(info.error_voxels),
+                            figures(info.error_field_voxels), info.sign_mismatches.wrong,
+                            info.sign_mismatches.samples, bake.reused ? "  (reused)" : "");
     }
     return text;
 }
@@ -148,11 +158,19 @@ void add_bake_command(CLI::App& app, Program& program) {
             "given a thickness of about a voxel")
         ->check(CLI::IsMember(class_names()))
         ->capture_default_str();
-    verb.add_option("--max-field-bytes", settings.max_field_bytes,
-                    "Coarsen any field that would take more memory than this; 0: no limit")
+    verb.add_option(
+            "--max-field-bytes", settings.max_field_bytes,
+            "Coarsen any field that would take more memory than this in a tracer, and say so; 0: no limit")
         ->capture_default_str();
     verb.add_flag("--force", settings.force, "Bake even where the folder holds a bake that fits");
     verb.footer(
+        "Of the errors, mesh -> field is how far the field is from zero at points of the mesh, field -> mesh "
+        "how "
+        "far points of the field's surface are from the mesh: mean, P99 and maximum in voxels, less the "
+        "thickness that sheets and thin walls are given. Wrong signs are samples on the other side than the "
+        "exact winding number says, of those that were looked at.\n"
+        "A mesh that cannot be baked is named; the others are baked all the same, and the exit code is not "
+        "0.\n"
         "Examples:\n"
         "  fieldlight bake room.glb -o room.bake\n"
         "  fieldlight bake room.glb -o room.bake --voxel 0.02 --json\n"

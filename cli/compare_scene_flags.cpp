@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "cli/scene_tracers.h"
 #include "core/render/path_tracer.h"
 #include "core/support/error.h"
 #include "sdf/sampled_field.h"
@@ -33,6 +34,7 @@ void CompareSceneFlags::add_to(CLI::App& verb) {
         ->delimiter(',')
         ->check(CLI::Range(4, sdf::kMostVoxelsAlongSide))
         ->capture_default_str();
+    add_hit_mode_option(verb, options_.hit_mode);
     verb.add_option("--max-spp", options_.max_samples,
                     "The ladder is 1, 2, 4, ... samples a pixel up to this")
         ->check(CLI::Range(1, 1 << 20))

@@ -87,10 +87,12 @@ Method fields(const Program& program, const CompareSceneOptions& options, const 
     Method method;
     method.render = render_options(options, TracerKind::kSdf);
     method.render.bake.resolution = resolution;
+    method.render.hit_mode = options.hit_mode;
     const fs::path folder = options.bake_folder.empty() ? options.folder / "fields" : options.bake_folder;
     method.render.bake_folder = folder / std::to_string(resolution);
     method.series.method = fmt::format("fields {}", resolution);
     method.series.resolution = resolution;
+    method.series.hit_mode = name_of(options.hit_mode);
 
     const sdf::BakeResult baked = bake_fields(program, scene, method.render.bake, method.render.bake_folder);
     set_bake_price(method.render.bake_folder, baked, method.series);
@@ -99,7 +101,7 @@ Method fields(const Program& program, const CompareSceneOptions& options, const 
     }
     StageClock clock;
     const auto grids = sdf::grids_by_mesh(scene, baked);
-    method.tracers.sdf = std::make_unique<sdf::SdfTracer>(scene, grids);
+    method.tracers.sdf = std::make_unique<sdf::SdfTracer>(scene, grids, options.hit_mode);
     method.series.build_seconds = clock.lap();
     for (const auto& grid : grids) method.voxel_of_mesh.push_back(grid ? grid->voxel_size() : 0.0);
     method.series.median_voxel = median_voxel(scene, method.voxel_of_mesh);

@@ -21,7 +21,6 @@ constexpr std::array kLaterFlags = {
     LaterFlag{"--effects", "the plan"},
     LaterFlag{"--frames", "animation"},
     LaterFlag{"--fps", "animation"},
-    LaterFlag{"--hit-mode", "the vectorised field tracer; hits are exact roots (cubic) until then"},
     LaterFlag{"--max-memory", "memory limits"},
 };
 

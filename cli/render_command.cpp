@@ -110,6 +110,7 @@ void add_render_command(CLI::App& app, Program& program) {
     verb->add_option("--primary", options.primary, "What camera rays meet: triangle (default) or sdf")
         ->transform(CLI::CheckedTransformer(tracers).description(""))
         ->type_name("KIND");
+    add_hit_mode_option(*verb, options.hit_mode);
     verb->add_option("--renderer", flags->renderer, "path: the path tracer")
         ->check(CLI::IsMember({"path", "gather", "irradiance-field", "screen-denoiser", "direct"})
                     .description(""))
@@ -134,6 +135,9 @@ void add_render_command(CLI::App& app, Program& program) {
     flags->voxel_option = verb->add_option("--voxel", flags->voxel, "Voxel in world units instead")
                               ->check(CLI::PositiveNumber)
                               ->excludes(resolution);
+    verb->add_option("--max-field-bytes", options.bake.max_field_bytes,
+                     "Coarsen any field that would take more memory than this, and say so; 0: no limit")
+        ->capture_default_str();
     verb->add_option("--bake-dir", options.bake_folder,
                      "Where baked fields are kept; default SCENE.bake beside the output");
     verb->add_option("--aov", flags->aovs,

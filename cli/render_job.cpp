@@ -42,6 +42,8 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
             {"height", frame.image.height()},
             {"tracer", name_of(options.tracer)},
             {"primary", name_of(options.primary)},
+            {"hit_mode",
+             traces_fields(options) ? nlohmann::json(name_of(options.hit_mode)) : nlohmann::json(nullptr)},
             {"renderer", "path"},
             {"threads", core::thread_limit()},
             {"isa", instruction_set()},
@@ -102,10 +104,14 @@ core::ExrAttributes picture_attributes(const RenderOptions& options, const core:
     attributes["sceneHash"] = core::scene_hash(scene);
     attributes["sky"] = scene.sky_description;
     attributes["sun"] = options.scene.sun.empty() ? std::string("none") : options.scene.sun;
-    if (options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf) {
+    if (traces_fields(options)) {
+        attributes["hitMode"] = std::string(name_of(options.hit_mode));
         attributes["voxels"] = options.bake.voxel_world
                                    ? fmt::format("{} world units", *options.bake.voxel_world)
                                    : fmt::format("{} on the longest side", options.bake.resolution);
+        if (options.bake.max_field_bytes > 0) {
+            attributes["maxFieldBytes"] = std::to_string(options.bake.max_field_bytes);
+        }
     }
     return attributes;
 }
@@ -143,16 +149,18 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
         choose_camera(program, options.scene, scene, static_cast<double>(options.width) / options.height);
     const double load_seconds = clock.lap();
 
-    const bool needs_sdf = options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf;
     const bool needs_triangles =
         options.tracer == TracerKind::kTriangle || options.primary == TracerKind::kTriangle;
     SceneTracers tracers;
     std::optional<sdf::BakeResult> baked;
-    if (needs_sdf) baked = bake_fields(program, scene, options.bake, bake_folder(options));
+    if (traces_fields(options)) baked = bake_fields(program, scene, options.bake, bake_folder(options));
     const double bake_seconds = clock.lap();
 
     if (needs_triangles) tracers.triangle = std::make_unique<core::TriangleTracer>(scene);
-    if (baked) tracers.sdf = std::make_unique<sdf::SdfTracer>(scene, sdf::grids_by_mesh(scene, *baked));
+    if (baked) {
+        tracers.sdf =
+            std::make_unique<sdf::SdfTracer>(scene, sdf::grids_by_mesh(scene, *baked), options.hit_mode);
+    }
     const double build_seconds = clock.lap();
 
     const core::Frame frame = render_frame(program, options, scene, camera, tracers);
@@ -172,6 +180,12 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     const double write_seconds = clock.lap();
 
     nlohmann::json statistics = statistics_of(program, options, frame, tracers);
+    statistics["missing_meshes"] = nlohmann::json::array();
+    if (baked) {
+        for (const sdf::MeshBake& mesh : baked->meshes) {
+            if (mesh.error) statistics["missing_meshes"].push_back(mesh.name);
+        }
+    }
     statistics["seconds"] = {{"load", load_seconds},
                              {"bake", bake_seconds},
                              {"build", build_seconds},

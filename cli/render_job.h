@@ -31,6 +31,7 @@ struct RenderOptions {
     std::uint64_t seed = 0;
     double time_budget_seconds = 0.0;
     std::set<std::string> aovs;
+    sdf::HitMode hit_mode = sdf::HitMode::kCubic;  ///< Of rays through fields.
     sdf::BakeSettings bake;
     std::filesystem::path bake_folder;  ///< Empty: `SCENE.bake` beside the output.
     bool half = false;
@@ -39,6 +40,11 @@ struct RenderOptions {
     core::ToneMap tone_map = core::ToneMap::kAces;
     std::filesystem::path stats;
 };
+
+/// Whether any of its rays go through fields.
+inline bool traces_fields(const RenderOptions& options) {
+    return options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf;
+}
 
 /// The picture alone, of a scene that is ready to be traced.
 /// @throws core::InputError, core::Interrupted; std::runtime_error if a value is not finite

@@ -47,9 +47,10 @@ std::string render_line(const RenderOptions& options, bool allow_external) {
     std::vector<std::string> line = {
         "render",   options.scene.file.string(), "-o",        options.output.string(),
         "--tracer", name_of(options.tracer),     "--primary", name_of(options.primary)};
-    if (options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf) {
-        line.insert(line.end(), {"--resolution", std::to_string(options.bake.resolution), "--bake-dir",
-                                 options.bake_folder.string()});
+    if (traces_fields(options)) {
+        line.insert(line.end(),
+                    {"--hit-mode", name_of(options.hit_mode), "--resolution",
+                     std::to_string(options.bake.resolution), "--bake-dir", options.bake_folder.string()});
     }
     line.insert(line.end(), {"--size", fmt::format("{}x{}", options.width, options.height), "--spp",
                              std::to_string(options.samples_per_pixel)});

@@ -50,6 +50,7 @@ struct ReportSeries {
     std::string method;         ///< Shown and unique: "triangles", "fields 128".
     std::string tracer;         ///< triangle or sdf
     int resolution = 0;         ///< Voxels on the longest side of a mesh; 0 for triangles.
+    std::string hit_mode;       ///< eps, secant or cubic; empty for triangles.
     double median_voxel = 0.0;  ///< World size, median over instances; 0 for triangles.
     double load_seconds = 0.0, bake_seconds = 0.0, build_seconds = 0.0;  ///< What cold adds to warm.
     bool bake_reused = false;  ///< Some field came from an earlier run: bake_seconds is not the whole price.

@@ -47,6 +47,7 @@ json as_json(const ReportSeries& series) {
             {"settings",
              {{"tracer", series.tracer},
               {"resolution", series.resolution},
+              {"hit_mode", series.hit_mode.empty() ? json(nullptr) : json(series.hit_mode)},
               {"median_voxel", series.median_voxel}}},
             {"seconds",
              {{"load", series.load_seconds}, {"bake", series.bake_seconds}, {"build", series.build_seconds}}},

@@ -84,8 +84,9 @@ std::string name_of(const Report& report, const std::string& method) {
 
 Cell method_cell(const Report& report, std::size_t series) {
     Cell cell{.value = series_name(report, series)};
-    if (report.series[series].median_voxel > 0.0)
-        cell.interval = fmt::format("median voxel {}", significant(report.series[series].median_voxel));
+    const ReportSeries& shown = report.series[series];
+    if (shown.median_voxel > 0.0) cell.interval = "median voxel " + significant(shown.median_voxel);
+    if (!shown.hit_mode.empty()) cell.interval += fmt::format(", {} hits", shown.hit_mode);
     return cell;
 }
 

@@ -19,6 +19,12 @@ enum class TracerKind { kSdf, kTriangle };
 /// As the flags spell it: sdf, triangle.
 const char* name_of(TracerKind kind);
 
+/// As the flags spell it: eps, secant, cubic.
+const char* name_of(sdf::HitMode mode);
+
+/// Declares --hit-mode; its help says what each mode costs and gives.
+void add_hit_mode_option(CLI::App& verb, sdf::HitMode& mode);
+
 /// The tracers that a picture needs, and no others. The scene must outlive them.
 struct SceneTracers {
     std::unique_ptr<core::TriangleTracer> triangle;

@@ -10,6 +10,7 @@
 
 #include "core/support/hash.h"
 #include "core/support/parallel.h"
+#include "sdf/field_memory.h"
 #include "sdf/transform_scale.h"
 #include "sdf/vdb_file.h"
 
@@ -92,27 +93,41 @@ BakedGrid bake_within_limits(const core::Mesh& mesh, double voxel, double longes
                                        voxel, longest_side / voxel, finest));
         voxel = finest;
     }
+    const std::uint64_t limit = settings.max_field_bytes;
+    std::string coarsened;  // What the first voxel would have taken.
     for (int attempt = 0;; ++attempt) {
-        BakedGrid baked{bake_mesh(view_of(mesh), {voxel, settings.surface_class}), nullptr};
+        BakedGrid baked{bake_mesh(view_of(mesh), {voxel, settings.surface_class, settings.max_dimension}),
+                        nullptr};
         FieldInfo& info = baked.field.info;
         info.source_hash = key.source_hash;
         info.settings_hash = key.settings_hash;
+        if (attempt > 0) {
+            warnings.back() = fmt::format("{}; a voxel of {:g} is used, {:.0f} along the longest side",
+                                          coarsened, voxel, longest_side / voxel);
+        }
         info.warnings.insert(info.warnings.begin(), warnings.begin(), warnings.end());
         baked.grid = std::make_shared<const BrickGrid>(baked.field);
-        const std::size_t bytes = baked.grid->bytes();
-        if (settings.max_field_bytes == 0 || bytes <= settings.max_field_bytes) return baked;
-        if (attempt == kMostCoarsenings) {
+        const FieldMemory memory = field_memory(*baked.grid, mesh.triangles.size());
+        if (limit == 0 || memory.total() <= limit) return baked;
+        if (attempt == kMostCoarsenings || memory.triangles >= limit) {
             throw core::InputError(
                 core::ErrorKind::kOutOfMemory,
-                fmt::format("its field takes {} bytes even with a voxel of {:g}; --max-field-bytes allows {}",
-                            bytes, voxel, settings.max_field_bytes));
+                fmt::format(
+                    "its field takes {} bytes of memory even with a voxel of {:g}, {} of them for its "
+                    "triangles; --max-field-bytes allows {}",
+                    memory.total(), voxel, memory.triangles, limit));
         }
-        // Bricks follow the surface, so bytes go with 1 / h^2; a little more so that one step is enough.
-        const double excess = static_cast<double>(bytes) / static_cast<double>(settings.max_field_bytes);
-        const double coarser = voxel * std::max(1.1, 1.05 * std::sqrt(excess));
-        warnings.push_back(
-            fmt::format("a voxel of {:g} takes {} bytes; {:g} is used", voxel, bytes, coarser));
-        voxel = coarser;
+        if (attempt == 0) {
+            coarsened =
+                fmt::format("a voxel of {:g} takes {} bytes of memory, and --max-field-bytes allows {}",
+                            voxel, memory.total(), limit);
+            warnings.emplace_back();
+        }
+        // Bricks follow the surface, so their bytes go with 1 / h^2; a little more so that one step is
+        // enough.
+        const double excess =
+            static_cast<double>(memory.samples) / static_cast<double>(limit - memory.triangles);
+        voxel *= std::max(1.1, 1.05 * std::sqrt(excess));
     }
 }
 
@@ -154,6 +169,7 @@ void bake_one(const core::Scene& scene, const BakeSettings& settings, const fs::
     }
     const std::vector<std::string>& lasting = bake.info().warnings;
     bake.warnings.insert(bake.warnings.end(), lasting.begin(), lasting.end());
+    bake.memory_bytes = field_memory(*bake.grid, mesh.triangles.size()).total();
     if (!bake.file.empty()) bake.file_bytes = fs::file_size(bake.file);
 }
 

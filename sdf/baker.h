@@ -24,8 +24,8 @@ struct BakeSettings {
     std::optional<double> voxel_world;
     /// No mesh gets more voxels than this along a side; coarser with a warning instead.
     int max_dimension = 1024;
-    /// No mesh gets a field larger than this, in bytes of the runtime layout; coarser with a warning instead.
-    /// 0: no limit.
+    /// No mesh gets a field that takes more bytes than this in a tracer (see FieldMemory); coarser with a
+    /// warning instead. 0: no limit.
     std::uint64_t max_field_bytes = 0;
     ClassOverride surface_class = ClassOverride::kAuto;
     /// Only the mesh of this name; empty: all.
@@ -42,6 +42,7 @@ struct MeshBake {
     std::shared_ptr<const BrickGrid> grid;  ///< Null if it failed or was not asked for.
     std::filesystem::path file;             ///< Empty where nothing was written or read.
     std::uint64_t file_bytes = 0;
+    std::uint64_t memory_bytes = 0;  ///< Of the field in a tracer.
     double seconds = 0.0;
     bool reused = false;  ///< Read from the folder instead of baked.
     /// Of the field (FieldInfo::warnings), and of this run: an earlier bake that was of no use.

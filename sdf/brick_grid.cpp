@@ -150,6 +150,7 @@ BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), features_(f
         palettes_.insert(palettes_.end(), palettes[number].begin(), palettes[number].end());
     }
     palettes_.shrink_to_fit();
+    bricks_.shrink_to_fit();
     fill_empty_distances();
 }
 

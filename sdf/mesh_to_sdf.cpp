@@ -236,6 +236,39 @@ void describe_drops(const CleanMesh& mesh, std::vector<std::string>& warnings) {
     say(mesh.duplicate_count, "the same three vertices as another face");
 }
 
+/// Names the thinnest wall and the resolution that holds it. Thinner spots than were seen may lie between the
+/// pieces, so it is a little finer than those need.
+void describe_thin_walls(const ThinWalls& found, FieldInfo& info, double longest, int most_resolution) {
+    const double h = info.voxel_size;
+    const auto resolution_for = [&](double thickness_voxels) {
+        constexpr double kMargin = 1.05;
+        return std::ceil(kMargin * kSafeThickness * longest / (thickness_voxels * h));
+    };
+    const ThinWalls::Walls& walls = found.walls;
+    if (walls.area_fraction > 0.0) {
+        const glm::dvec3 at = info.origin + h * walls.thinnest_at;
+        const double all = resolution_for(walls.thinnest), most = resolution_for(walls.tenth_percentile);
+        std::string cure = fmt::format("no --resolution up to {} would hold them", most_resolution);
+        if (all <= most_resolution) {
+            cure = fmt::format("--resolution {:.0f} would hold all", all);
+        } else if (most <= most_resolution) {
+            cure = fmt::format("--resolution {:.0f} would hold nine tenths of them, none up to {} all", most,
+                               most_resolution);
+        }
+        info.warnings.push_back(fmt::format(
+            "{:.3g} % of the surface bounds walls too thin for the voxel of {:g} and is thickened by "
+            "{:g} on each side; the thinnest is {:g} thick, at ({:g}, {:g}, {:g}); {}",
+            100.0 * walls.area_fraction, h, kHalfThicknessVoxels * h, walls.thinnest * h, at.x, at.y, at.z,
+            cure));
+    }
+    if (found.edge_area_fraction > 0.0) {
+        info.warnings.push_back(fmt::format(
+            "{:.3g} % of the surface lies where sharp edges are thinner than the voxel of {:g} and is "
+            "thickened by {:g} on each side, and a finer --resolution makes that less",
+            100.0 * found.edge_area_fraction, h, kHalfThicknessVoxels * h));
+    }
+}
+
 /// What the samples take at least: a surface passes through no fewer leaves than its area has leaf faces, but
 /// through no more than there are in the box (pieces may lie on one another).
 std::uint64_t least_field_bytes(const std::vector<Triangle>& corners, const glm::dvec3& extent_voxels) {
@@ -322,19 +355,17 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
             thicken(walls, field.leaves);
             for (const std::uint32_t triangle : walls.triangle_of_piece)
                 features[triangle] = Feature::kThinWall;
-            const double wanted = 2.0 * longest / (walls.thickness * h);
-            info.warnings.push_back(
-                fmt::format("{:.1f} % of the surface bounds walls too thin for the voxel of {:g} and is "
-                            "thickened by {:g} on "
-                            "each side; walls are {:g} thick, which --resolution {:.0f} would hold",
-                            100.0 * walls.area_fraction, h, kHalfThicknessVoxels * h, walls.thickness * h,
-                            std::ceil(wanted)));
+            describe_thin_walls(walls, info, longest, options.most_resolution);
         }
     }
     info.half_thickness = sources.has_sheets || has_thin_walls ? kHalfThicknessVoxels * h : 0.0;
     info.clean_level_set =
         sources.has_solids && !sources.has_sheets && sources.solids_are_closed && !has_thin_walls;
-    info.error_voxels = measure_error(sources.corners, features, *sources.winding, LeafMap(field.leaves));
+    const BakedSurfaces surfaces{sources.corners, features, *sources.solids, *sources.sheets,
+                                 *sources.winding};
+    info.error_voxels = measure_error(surfaces, LeafMap(field.leaves));
+    info.error_field_voxels = measure_field_error(surfaces, field.leaves);
+    info.sign_mismatches = count_sign_mismatches(surfaces, field.leaves);
 
     if (info.half_thickness > 0.0) {
         field.features.assign(mesh.triangles.size(), Feature::kSurface);

@@ -20,6 +20,7 @@ enum class ClassOverride : std::uint8_t { kAuto, kSolid, kSheet };
 struct MeshBakeOptions {
     double voxel_size = 0.0;  ///< h in local units, > 0.
     ClassOverride surface_class = ClassOverride::kAuto;
+    int most_resolution = kMostVoxelsAlongSide;  ///< Warnings recommend none above it.
 };
 
 /// A mesh to bake. Indices out of range are dropped and counted like any other unusable face.

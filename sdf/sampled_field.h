@@ -53,6 +53,12 @@ struct ErrorFigures {
     double max = 0.0;
 };
 
+/// Stored samples held against the exact winding number of the solids.
+struct SignMismatches {
+    std::uint32_t samples = 0;  ///< How many were looked at.
+    std::uint32_t wrong = 0;    ///< Those on the wrong side.
+};
+
 /// What is known of a baked field besides its samples; the .vdb's metadata.
 struct FieldInfo {
     MeshClass mesh_class = MeshClass::kSolid;
@@ -63,6 +69,8 @@ struct FieldInfo {
     std::uint32_t triangle_count = 0;  ///< Of the source mesh.
     std::uint32_t dropped_faces = 0;   ///< Faces the bake could not use.
     ErrorFigures error_voxels;         ///< Mesh -> field; on inflated features beyond the half-thickness.
+    ErrorFigures error_field_voxels;   ///< Field -> mesh; likewise.
+    SignMismatches sign_mismatches;    ///< Farther than 0.01 voxel from the surface.
     std::string source_hash;           ///< Of the mesh's geometry.
     std::string settings_hash;         ///< Of everything else that decides the samples.
     std::vector<std::string> warnings;

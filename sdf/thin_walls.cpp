@@ -12,9 +12,8 @@ namespace {
 /// Edges of the pieces that triangles are cut into, in voxels.
 constexpr double kPieceEdge = 1.0;
 
-/// Walls thicker than this are always held by the lattice: along any direction two voxels hold a sample
-/// whose neighbours are inside as well.
-constexpr double kSafeThickness = 2.0;
+/// Sides are parallel up to 15 degrees.
+constexpr double kParallelCosine = 0.966;
 
 /// The middle of a wall must be this far inside, in voxels. A field that only just shows the wall here may
 /// miss it half a voxel away.
@@ -26,6 +25,9 @@ constexpr double kClearlyInside = 0.9;
 struct Piece {
     Triangle triangle;
     double thickness = 0.0;
+    bool is_wall = false;  ///< The other side is parallel.
+
+    glm::dvec3 center() const { return (triangle.a + triangle.b + triangle.c) / 3.0; }
 };
 
 void cut(const Triangle& triangle, std::vector<Piece>& pieces) {
@@ -80,12 +82,15 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
             pieces.clear();
             cut(triangle, pieces);
             for (Piece& piece : pieces) {
-                const glm::dvec3 center = (piece.triangle.a + piece.triangle.b + piece.triangle.c) / 3.0;
+                const glm::dvec3 center = piece.center();
                 // A voxel below the surface and still a voxel from any: thick, without asking further.
                 double depth = 0.0;
                 if (field.interpolate(center + inward, depth) && depth < -kClearlyInside) continue;
-                piece.thickness = solids.first_hit(center, inward, 1e-9, kSafeThickness).t;
+                const FirstHit other = solids.first_hit(center, inward, 1e-9, kSafeThickness);
+                piece.thickness = other.t;
                 if (!(piece.thickness < kSafeThickness)) continue;
+                const glm::dvec3 facing = glm::normalize(corners[other.triangle].scaled_normal());
+                piece.is_wall = std::abs(glm::dot(facing, inward)) > kParallelCosine;
                 if (!field.interpolate(center + 0.5 * piece.thickness * inward, depth)) continue;
                 if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness)) {
                     missing[i].push_back(piece);
@@ -96,21 +101,31 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
 
     ThinWalls result;
     std::vector<double> thicknesses;
-    double total_area = 0.0, missing_area = 0.0;
+    double total_area = 0.0, wall_area = 0.0, edge_area = 0.0;
+    result.walls.thinnest = kSafeThickness;
     for (std::size_t i = 0; i < missing.size(); ++i) {
         total_area += area[i];
         for (const Piece& piece : missing[i]) {
             result.pieces.push_back(piece.triangle);
             result.triangle_of_piece.push_back(solid_triangles[i]);
-            missing_area += 0.5 * glm::length(piece.triangle.scaled_normal());
+            const double piece_area = 0.5 * glm::length(piece.triangle.scaled_normal());
+            (piece.is_wall ? wall_area : edge_area) += piece_area;
+            if (!piece.is_wall) continue;
             thicknesses.push_back(piece.thickness);
+            if (piece.thickness < result.walls.thinnest) {
+                result.walls.thinnest = piece.thickness;
+                result.walls.thinnest_at = piece.center();
+            }
         }
     }
     if (!thicknesses.empty()) {
         const auto tenth = thicknesses.begin() + static_cast<std::ptrdiff_t>(thicknesses.size() / 10);
         std::nth_element(thicknesses.begin(), tenth, thicknesses.end());
-        result.thickness = *tenth;
-        result.area_fraction = missing_area / total_area;
+        result.walls.tenth_percentile = *tenth;
+    }
+    if (total_area > 0.0) {
+        result.walls.area_fraction = wall_area / total_area;
+        result.edge_area_fraction = edge_area / total_area;
     }
     return result;
 }

@@ -17,9 +17,21 @@ namespace sdf {
 struct ThinWalls {
     std::vector<Triangle> pieces;                  ///< Voxel units, edges of about a voxel.
     std::vector<std::uint32_t> triangle_of_piece;  ///< The clean triangle each was cut from.
-    double area_fraction = 0.0;                    ///< Of all solid triangles' area.
-    double thickness = 0.0;                        ///< Of the 10th percentile of those walls, in voxels.
+
+    /// Those whose two sides are about parallel. A finer voxel holds them.
+    struct Walls {
+        double area_fraction = 0.0;     ///< Of all solid triangles' area.
+        double thinnest = 0.0;          ///< Voxels.
+        glm::dvec3 thinnest_at{0.0};    ///< On the surface, in voxels.
+        double tenth_percentile = 0.0;  ///< Nine tenths are thicker, in voxels.
+    } walls;
+    /// The rest, where two sides run together at an edge: as thin as one likes at any voxel.
+    double edge_area_fraction = 0.0;
 };
+
+/// Walls thicker than this, in voxels, are always held by the lattice: along any direction two voxels hold a
+/// sample whose neighbours are inside as well.
+inline constexpr double kSafeThickness = 2.0;
 
 /// @param corners the clean triangles in voxels; @param components their classes.
 /// @param solids tree over the solid ones; @param field distances in voxels, sheets not yet thickened by thin

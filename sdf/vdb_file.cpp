@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of the files' layout and of what the samples mean; part of what decides whether a bake is used again.
-constexpr const char* kWriter = "fieldlight " FIELDLIGHT_VERSION " bake 3";
+constexpr const char* kWriter = "fieldlight " FIELDLIGHT_VERSION " bake 4";
 
 constexpr const char* kDistanceGrid = "distance";
 constexpr const char* kTriangleGrid = "triangle";
@@ -103,6 +103,11 @@ void write_metadata(const FieldInfo& info, const std::vector<Feature>& features,
     number("fieldlight_error_voxels_mean", info.error_voxels.mean);
     number("fieldlight_error_voxels_p99", info.error_voxels.p99);
     number("fieldlight_error_voxels_max", info.error_voxels.max);
+    number("fieldlight_error_field_voxels_mean", info.error_field_voxels.mean);
+    number("fieldlight_error_field_voxels_p99", info.error_field_voxels.p99);
+    number("fieldlight_error_field_voxels_max", info.error_field_voxels.max);
+    metadata.insertMeta("fieldlight_sign_samples", openvdb::Int64Metadata(info.sign_mismatches.samples));
+    metadata.insertMeta("fieldlight_sign_mismatches", openvdb::Int64Metadata(info.sign_mismatches.wrong));
     text("fieldlight_source_hash", info.source_hash);
     text("fieldlight_settings_hash", info.settings_hash);
     text("fieldlight_warnings", fmt::format("{}", fmt::join(info.warnings, "\n")));
@@ -222,7 +227,7 @@ public:
     std::uint32_t count(const char* name) const {
         const std::int64_t value = get<std::int64_t>(name);
         if (value < 0 || value > std::numeric_limits<std::int32_t>::max()) {
-            fail(path_, fmt::format("metadata '{}' is {}, which is no number of faces", name, value));
+            fail(path_, fmt::format("metadata '{}' is {}, which is no count", name, value));
         }
         return static_cast<std::uint32_t>(value);
     }
@@ -262,6 +267,11 @@ FieldInfo read_info(const fs::path& path, const openvdb::MetaMap& metadata) {
     info.error_voxels = {reader.finite("fieldlight_error_voxels_mean"),
                          reader.finite("fieldlight_error_voxels_p99"),
                          reader.finite("fieldlight_error_voxels_max")};
+    info.error_field_voxels = {reader.finite("fieldlight_error_field_voxels_mean"),
+                               reader.finite("fieldlight_error_field_voxels_p99"),
+                               reader.finite("fieldlight_error_field_voxels_max")};
+    info.sign_mismatches = {reader.count("fieldlight_sign_samples"),
+                            reader.count("fieldlight_sign_mismatches")};
     info.source_hash = reader.get<std::string>("fieldlight_source_hash");
     info.settings_hash = reader.get<std::string>("fieldlight_settings_hash");
     info.warnings = split_lines(reader.get<std::string>("fieldlight_warnings"));

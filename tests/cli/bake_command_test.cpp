@@ -62,6 +62,15 @@ TEST(BakeCommand, WritesOneFileAMeshAndReportsEveryKey) {
         EXPECT_GT(mesh["voxel"].get<double>(), 0.0);
         EXPECT_EQ(mesh["bytes"].get<std::uintmax_t>(), fs::file_size(mesh["file"].get<std::string>()));
         EXPECT_LE(mesh["error_voxels"]["mean"].get<double>(), mesh["error_voxels"]["max"].get<double>());
+        EXPECT_LE(mesh["error_field_voxels"]["mean"].get<double>(),
+                  mesh["error_field_voxels"]["p99"].get<double>());
+        EXPECT_LE(mesh["error_field_voxels"]["p99"].get<double>(),
+                  mesh["error_field_voxels"]["max"].get<double>());
+        EXPECT_EQ(mesh["sign_mismatches"]["wrong"], 0);
+        if (surface == "sheet") {
+            EXPECT_EQ(mesh["sign_mismatches"]["samples"], 0);
+        }
+        EXPECT_GT(mesh["memory_bytes"].get<int>(), 0);
         EXPECT_EQ(mesh["dropped_faces"], 0);
         EXPECT_TRUE(mesh["warnings"].is_array());
         EXPECT_FALSE(mesh["reused"].get<bool>());
@@ -72,6 +81,12 @@ TEST(BakeCommand, WritesOneFileAMeshAndReportsEveryKey) {
         EXPECT_EQ(inspected["grids"][0]["nan_samples"], 0);
         EXPECT_EQ(inspected["grids"][0]["metadata"]["fieldlight_class"], surface);
         EXPECT_GT(inspected["grids"][0]["active_voxels"].get<int>(), 0);
+        const nlohmann::json& metadata = inspected["grids"][0]["metadata"];
+        EXPECT_NEAR(std::stod(metadata["fieldlight_error_field_voxels_p99"].get<std::string>()),
+                    mesh["error_field_voxels"]["p99"].get<double>(), 1e-5);
+        EXPECT_EQ(metadata["fieldlight_sign_samples"],
+                  std::to_string(mesh["sign_mismatches"]["samples"].get<int>()));
+        EXPECT_EQ(metadata["fieldlight_sign_mismatches"], "0");
     }
     const nlohmann::json again = nlohmann::json::parse(run(arguments).out);
     for (const nlohmann::json& mesh : again["meshes"]) EXPECT_TRUE(mesh["reused"].get<bool>());

@@ -125,11 +125,11 @@ TEST(Baker, LimitsMakeFieldsCoarserAndSaySo) {
 
     settings = {};
     settings.resolution = 64;
-    const std::size_t unlimited = sdf::bake_scene(scene, settings, {}).meshes[0].grid->bytes();
+    const std::size_t unlimited = sdf::bake_scene(scene, settings, {}).meshes[0].memory_bytes;
     settings.max_field_bytes = unlimited / 3;
     const sdf::MeshBake small = sdf::bake_scene(scene, settings, {}).meshes[0];
-    EXPECT_LE(small.grid->bytes(), settings.max_field_bytes);
-    EXPECT_GT(small.grid->bytes(), settings.max_field_bytes / 4);
+    EXPECT_LE(small.memory_bytes, settings.max_field_bytes);
+    EXPECT_GT(small.memory_bytes, settings.max_field_bytes / 4);
     EXPECT_FALSE(small.info().warnings.empty());
 }
 

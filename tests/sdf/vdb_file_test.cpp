@@ -65,6 +65,8 @@ TEST(VdbFile, ComesBackAsItWasWritten) {
     field.info.source_hash = "source";
     field.info.settings_hash = "settings";
     field.info.warnings = {"first", "second"};
+    field.info.error_field_voxels = {0.125, 0.25, 0.5};
+    field.info.sign_mismatches = {2000, 3};
     const fs::path path = folder.path() / "field.vdb";
     sdf::write_field(path, field, "both");
     const sdf::SampledField back = sdf::read_field(path);
@@ -75,6 +77,11 @@ TEST(VdbFile, ComesBackAsItWasWritten) {
     EXPECT_EQ(back.info.clean_level_set, field.info.clean_level_set);
     EXPECT_EQ(back.info.triangle_count, field.info.triangle_count);
     EXPECT_EQ(back.info.error_voxels.p99, field.info.error_voxels.p99);
+    EXPECT_EQ(back.info.error_field_voxels.mean, 0.125);
+    EXPECT_EQ(back.info.error_field_voxels.p99, 0.25);
+    EXPECT_EQ(back.info.error_field_voxels.max, 0.5);
+    EXPECT_EQ(back.info.sign_mismatches.samples, 2000u);
+    EXPECT_EQ(back.info.sign_mismatches.wrong, 3u);
     EXPECT_EQ(back.info.source_hash, "source");
     EXPECT_EQ(back.info.settings_hash, "settings");
     EXPECT_EQ(back.info.warnings, field.info.warnings);
@@ -213,6 +220,17 @@ TEST(VdbFile, SpoiledFilesAreRefusedByName) {
     refused("ranges of triangles", [](Distance& grid, Index&) {
         grid.insertMeta("fieldlight_sheet_triangles", openvdb::StringMetadata("5-99999999999"));
     });
+}
+
+TEST(VdbFile, OfAnEarlierVersionIsNoBakeToUseAgain) {
+    const SpoiledFile old([](openvdb::FloatGrid& grid, openvdb::Int32Grid&) {
+        grid.insertMeta("fieldlight_writer",
+                        openvdb::StringMetadata("fieldlight " FIELDLIGHT_VERSION " bake 3"));
+        grid.removeMeta("fieldlight_sign_samples");
+    });
+    EXPECT_FALSE(sdf::read_bake_key(old.path()));
+    expect_refused(old.path(), core::ErrorKind::kBadData, "bake it again");
+    EXPECT_EQ(sdf::summarise_vdb(old.path()).size(), 2u) << "anyone may still look into it";
 }
 
 TEST(VdbFile, TruncatedAndForeignFilesAreRefusedByName) {

@@ -144,7 +144,10 @@ def baked(compression):
         "fieldlight_half_thickness": ("double", 0.1), "fieldlight_clean_level_set": ("bool", False),
         "fieldlight_triangle_count": ("int64", 9), "fieldlight_dropped_faces": ("int64", 1),
         "fieldlight_error_voxels_mean": ("double", 0.1), "fieldlight_error_voxels_p99": ("double", 0.2),
-        "fieldlight_error_voxels_max": ("double", 0.3), "fieldlight_source_hash": ("string", "s"),
+        "fieldlight_error_voxels_max": ("double", 0.3), "fieldlight_error_field_voxels_mean": ("double", 0.1),
+        "fieldlight_error_field_voxels_p99": ("double", 0.2),
+        "fieldlight_error_field_voxels_max": ("double", 0.3), "fieldlight_sign_samples": ("int64", 400),
+        "fieldlight_sign_mismatches": ("int64", 3), "fieldlight_source_hash": ("string", "s"),
         "fieldlight_settings_hash": ("string", "t"), "fieldlight_warnings": ("string", "one\ntwo"),
         "fieldlight_sheet_triangles": ("string", "0-2,5"), "fieldlight_thin_wall_triangles": ("string", "3"),
         "name": ("string", "distance"), "class": ("string", "unknown")}
