@@ -101,6 +101,11 @@ KillCounts kill_at_random_points(const WritingVerb& verb, int count) {
         EXPECT_TRUE(run.signal == SIGKILL || run.exit_code == verb.exit_code) << run.err;
         expect_old_or_whole(place, /*may_leave_temporary=*/true);
     }
+    // What a kill left behind hinders nobody, though what is whole may be used again as it is.
+    const ProgramRun next = place.run();
+    EXPECT_EQ(next.exit_code, verb.exit_code) << next.err;
+    expect_old_or_whole(place, /*may_leave_temporary=*/true);
+    place.put_old_files();
     const ProgramRun last = place.run();
     EXPECT_EQ(last.exit_code, verb.exit_code) << last.err;
     for (const std::string& file : place.files()) EXPECT_TRUE(is_whole(place.path(file))) << file;
