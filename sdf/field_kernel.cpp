@@ -333,7 +333,8 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
                                 Floats count) HWY_ATTR {
         const Floats cell = hn::Floor(hn::Load(kFloat, origin) + next * hn::Load(kFloat, direction));
         const Floats from = hn::IfThenZeroElse(jumps, low);
-        const Floats to = hn::IfThenElse(jumps, count, low + exit.size) - one;
+        // The last block may reach beyond the field.
+        const Floats to = hn::Min(count, hn::IfThenElse(jumps, count, low + exit.size)) - one;
         return hn::Min(hn::Max(cell, from), to);
     };
     Floats next_x = cell_after(p.ox, p.dx, exit.low_x, count_x),
