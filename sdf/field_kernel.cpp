@@ -133,6 +133,7 @@ HWY_INLINE HWY_ATTR Floats first_root(const CubicLanes& cubic, Mask negative, Ma
     const Mask usable = hn::And(hn::Ge(share, zero), hn::Le(share, one));
     Floats s = hn::IfThenElse(usable, low + share * (high - low), hn::Set(kFloat, 0.5f) * (low + high));
     constexpr int kIterations = 4;
+    constexpr float kRootSteps = 0.01f;
     for (int i = 0; i < kIterations; ++i) {
         const Floats value = cubic.at(s);
         const Mask before = hn::Not(differ(is_negative(value), negative));
@@ -140,7 +141,9 @@ HWY_INLINE HWY_ATTR Floats first_root(const CubicLanes& cubic, Mask negative, Ma
         high = hn::IfThenElse(before, high, s);
         const Floats newton = s - value / cubic.slope(s);
         const Mask inside = hn::And(hn::Ge(newton, low), hn::Le(newton, high));
-        s = hn::IfThenElse(inside, newton, hn::Set(kFloat, 0.5f) * (low + high));
+        const Floats closer = hn::IfThenElse(inside, newton, hn::Set(kFloat, 0.5f) * (low + high));
+        // At a double root the slope says nothing.
+        s = hn::IfThenElse(hn::Lt(hn::Abs(value), hn::Set(kFloat, kRootSteps)), s, closer);
     }
     return s;
 }
