@@ -291,35 +291,35 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
                 const Mask closing = hn::Lt(later, ahead);
                 const Floats further = look * ahead / (ahead - later);
                 const Mask found =
-                    hn::And(is_near, hn::Or(hn::And(closing, hn::Lt(further, one)), hn::Lt(ahead, zero)));
+                    hn::And(is_near, hn::And(hn::Ge(ahead, zero), hn::And(closing, hn::Lt(further, one))));
                 hit_s = hn::IfThenElse(found, s + unit_clamped(further), hit_s);
                 ended.hit = hn::Or(ended.hit, found);
             }
         } else {
-            const Mask mixed =
-                hn::AndNot(hn::Or(uniform, is_empty), hn::Eq(hn::Load(kFloat, p.searched), zero));
             safe = hn::IfThenElseZero(uniform, safe);
-            if (!hn::AllFalse(kFloat, mixed)) {
-                const Place far = place_at(p, exit.nearest);
-                Mask may_cross;
-                if constexpr (kMode == HitMode::kSecant) {
-                    const Floats far_value = corners.at(far.x, far.y, far.z);
-                    may_cross = hn::Or(differ(is_negative(value), negative),
-                                       differ(is_negative(far_value), negative));
-                } else {
-                    // The cubic lies within the hull of its Bernstein coefficients.
-                    const CubicLanes cubic = cubic_along(corners, near.x, near.y, near.z, far.x - near.x,
-                                                         far.y - near.y, far.z - near.z);
-                    const Floats third = hn::Set(kFloat, 1.0f / 3.0f);
-                    const Floats b1 = cubic.c0 + third * cubic.c1;
-                    const Floats b2 = b1 + third * (cubic.c1 + cubic.c2);
-                    const Floats b3 = cubic.at(one);
-                    may_cross = hn::Or(
-                        hn::Or(differ(is_negative(value), negative), differ(is_negative(b1), negative)),
-                        hn::Or(differ(is_negative(b2), negative), differ(is_negative(b3), negative)));
-                }
-                ended.candidate = hn::And(mixed, may_cross);
+        }
+        const Mask mixed = hn::AndNot(hn::Or(uniform, is_empty), hn::Eq(hn::Load(kFloat, p.searched), zero));
+        if (!hn::AllFalse(kFloat, mixed)) {
+            const Place far = place_at(p, exit.nearest);
+            Mask may_cross;
+            if constexpr (kMode == HitMode::kCubic) {
+                // The cubic lies within the hull of its Bernstein coefficients.
+                const CubicLanes cubic = cubic_along(corners, near.x, near.y, near.z, far.x - near.x,
+                                                     far.y - near.y, far.z - near.z);
+                const Floats third = hn::Set(kFloat, 1.0f / 3.0f);
+                const Floats b1 = cubic.c0 + third * cubic.c1;
+                const Floats b2 = b1 + third * (cubic.c1 + cubic.c2);
+                const Floats b3 = cubic.at(one);
+                may_cross =
+                    hn::Or(hn::Or(differ(is_negative(value), negative), differ(is_negative(b1), negative)),
+                           hn::Or(differ(is_negative(b2), negative), differ(is_negative(b3), negative)));
+            } else {
+                // A cell is wider than eps: the ray may come through the surface between two samples.
+                const Floats far_value = corners.at(far.x, far.y, far.z);
+                may_cross =
+                    hn::Or(differ(is_negative(value), negative), differ(is_negative(far_value), negative));
             }
+            ended.candidate = hn::And(mixed, may_cross);
         }
         ended.hit = hn::And(ended.hit, hn::Le(hit_s, hn::Load(kFloat, p.length)));
         hn::Store(hit_s, kFloat, p.hit_s);
