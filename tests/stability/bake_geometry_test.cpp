@@ -378,7 +378,7 @@ TEST(Case14, NoPointOfAnEmptyBlockIsNearerToASurfaceThanItsBound) {
             violations += occupied.any_nearer(point, bound);
         }
         EXPECT_EQ(violations, 0) << "of " << checked;
-        EXPECT_GT(farthest, 10.0);
+        EXPECT_GT(farthest, 5.0);
     }
 }
 

@@ -149,15 +149,20 @@ Deviation Reference::deviation_of(const core::Hit& hit) const {
     if (hit.hit()) {
         end = hit.t;
         deviation.value = std::abs(field_at(end, kFar));
-        double nearest = std::numeric_limits<double>::infinity();
+        double nearest = std::numeric_limits<double>::infinity(), place = end;
         for (const Place& crossing : crossings_) {
             const double apart = std::abs(crossing.t - end) * speed();
             if (apart > nearest) continue;
             nearest = apart;
+            place = crossing.t;
             deviation.along = apart * crossing.slope;
         }
-        // A ray that only touched the surface.
-        if (nearest > 2.0) deviation.along = 0.0;
+        // A ray that only touched the surface there: on its way to the crossing it leaves it again.
+        constexpr int kParts = 8;
+        for (int k = 1; k < kParts && deviation.along > 0.0; ++k) {
+            const double between = field_at(end + (place - end) * k / kParts, kFar);
+            if (std::abs(between) > 2.0 * deviation.value + 1e-7) deviation.along = 0.0;
+        }
     }
     // Between the first and the second crossing, the third and the fourth, and so on the ray is behind the
     // surface.

@@ -229,16 +229,23 @@ TEST(Case36, EpsConvergesToCubic) {
         for (const sdf::HitMode mode : kHitModes) {
             const core::HitStream hits = trace_both(baked.tracer(mode), rays);
             double sum = 0.0;
-            int compared = 0;
+            int compared = 0, elsewhere = 0;
             for (std::size_t i = 0; i < rays.size(); ++i) {
                 const core::Hit a = exact.get(i), b = hits.get(i);
                 if (!a.hit() || !b.hit()) continue;
                 const double cosine = -glm::dot(glm::dvec3(a.normal), glm::dvec3(rays.get(i).direction));
                 if (cosine < 0.2) continue;
-                sum += std::abs(double(a.t) - b.t) * cosine;
+                const double off = std::abs(double(a.t) - b.t) * cosine;
                 ++compared;
+                // Where a mode meets another piece of the surface it says nothing of convergence.
+                if (off > 0.5 * baked.voxel()) {
+                    ++elsewhere;
+                } else {
+                    sum += off;
+                }
             }
             mean[static_cast<int>(mode)][level] = sum / compared;
+            EXPECT_LE(elsewhere, compared / 1000);
         }
     }
     for (const auto mode : {sdf::HitMode::kEps, sdf::HitMode::kSecant}) {
