@@ -23,6 +23,10 @@ constexpr double kNeededDepth = 0.1;
 /// A value of the field, in voxels, that a wall of kSafeThickness has at its middle.
 constexpr double kClearlyInside = 0.9;
 
+/// Where a piece's outer side is asked for, in voxels off it: inside there, it lies within another solid and
+/// bounds nothing.
+constexpr double kOutside = 1e-3;
+
 struct Piece {
     Triangle triangle;
     double thickness = 0.0;
@@ -56,7 +60,7 @@ void cut(const Triangle& triangle, std::vector<Piece>& pieces) {
 }  // namespace
 
 ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vector<Component>& components,
-                          const TriangleBvh& solids, const LeafMap& field) {
+                          const TriangleBvh& solids, const WindingNumber& winding, const LeafMap& field) {
     std::vector<std::uint32_t> solid_triangles;
     std::vector<std::uint8_t> inverted;
     for (const Component& component : components) {
@@ -83,9 +87,16 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
                 double depth = 0.0;
                 if (field.interpolate(center + inward, depth) && depth < -kClearlyInside) continue;
                 piece.thickness = solids.first_hit(center, inward, 1e-9, kSafeThickness).t;
+                // What lies within another solid is no end of the wall.
+                while (piece.thickness < kSafeThickness &&
+                       winding.is_inside(center + (piece.thickness + kOutside) * inward)) {
+                    piece.thickness =
+                        solids.first_hit(center, inward, piece.thickness + kOutside, kSafeThickness).t;
+                }
                 if (!(piece.thickness < kSafeThickness)) continue;
                 if (!field.interpolate(center + 0.5 * piece.thickness * inward, depth)) continue;
-                if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness)) {
+                if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness) &&
+                    !winding.is_inside(center - kOutside * inward)) {
                     missing[i].push_back(piece);
                 }
             }
