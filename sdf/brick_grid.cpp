@@ -15,12 +15,15 @@ namespace {
 using LeafMask = std::bitset<kLeafSize>;
 
 /// Cells, named by their lowest corner, that hold a zero crossing: all corners known and not of one sign.
-LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf) {
+/// Cells behind a surface that lies in their own corners count as well: where rounding hides a crossing in
+/// the face of a cell, it is the next one that tells.
+/// @param zero_below values from 0 up to this are stored as 0
+LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf, float zero_below) {
     LeafMask occupied;
     for (int i = 0; i < kLeafSize; ++i) {
         if (!leaf.is_active(i)) continue;
         const glm::ivec3 cell(i / 64, i / 8 % 8, i % 8);
-        int negative = 0;
+        int negative = 0, zero = 0;
         bool is_known = true;
         for (int corner = 0; corner < 8 && is_known; ++corner) {
             const glm::ivec3 local = cell + glm::ivec3(corner >> 2 & 1, corner >> 1 & 1, corner & 1);
@@ -35,8 +38,9 @@ LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf) {
                 if (sample) value = *sample;
             }
             negative += value < 0.0f;
+            zero += value >= 0.0f && value <= zero_below;
         }
-        occupied[static_cast<std::size_t>(i)] = is_known && negative > 0 && negative < 8;
+        occupied[static_cast<std::size_t>(i)] = is_known && negative < 8 && negative + zero > 0;
     }
     return occupied;
 }
@@ -96,8 +100,11 @@ std::int16_t stored_sample(float voxels) {
 BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), features_(field.features) {
     const LeafMap map(field.leaves);
     std::vector<LeafMask> occupied(field.leaves.size());
+    const auto zero_below =
+        static_cast<float>(0.5 * static_cast<double>(kSampleStepVoxels) * field.info.voxel_size);
     core::parallel_for(field.leaves.size(), 8, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) occupied[i] = occupied_cells(map, field.leaves[i]);
+        for (std::size_t i = begin; i < end; ++i)
+            occupied[i] = occupied_cells(map, field.leaves[i], zero_below);
     });
 
     core::BasicBounds<glm::dvec3> cells;

@@ -129,7 +129,7 @@ HWY_INLINE HWY_ATTR Floats first_root(const CubicLanes& cubic, Mask negative, Ma
     const Floats share = at_low / (at_low - at_high);
     const Mask usable = hn::And(hn::Ge(share, zero), hn::Le(share, one));
     Floats s = hn::IfThenElse(usable, low + share * (high - low), hn::Set(kFloat, 0.5f) * (low + high));
-    constexpr int kIterations = 4;
+    constexpr int kIterations = 6;
     constexpr float kRootSteps = 0.01f;
     for (int i = 0; i < kIterations; ++i) {
         const Floats value = cubic.at(s);

@@ -108,6 +108,9 @@ void measure_distances(const Sources& sources, const FieldLeaf& leaf, LeafDistan
     }
 }
 
+/// Samples nearer to a triangle than this lie on it, in voxels; and how far off it its sides are asked for.
+constexpr double kOnSurface = 1e-7, kOffSurface = 1e-3;
+
 /// Signs of one leaf's active samples: true inside. Where all solids are closed, two neighbours whose
 /// distances add up to more than their spacing lie on the same side, so one winding number serves each set of
 /// samples linked that way. Otherwise a sign may change far from any triangle, and every sample asks.
@@ -116,8 +119,19 @@ void find_signs(const Sources& sources, const FieldLeaf& leaf, const LeafDistanc
     inside.fill(0);
     if (!sources.has_solids) return;
     const auto ask = [&](int i) {
-        return sources.winding->is_inside(glm::dvec3(sample_position(leaf, i))) ? std::uint8_t{1}
-                                                                                : std::uint8_t{0};
+        const glm::dvec3 point(sample_position(leaf, i));
+        const auto slot = static_cast<std::size_t>(i);
+        bool is_inside = false;
+        if (distances.solid[slot] < kOnSurface) {
+            // On a surface there is no side to ask for. It counts as outside, save where both sides of the
+            // surface lie within another solid.
+            const glm::dvec3 step =
+                kOffSurface * glm::normalize(sources.corners[distances.solid_triangle[slot]].scaled_normal());
+            is_inside = sources.winding->is_inside(point + step) && sources.winding->is_inside(point - step);
+        } else {
+            is_inside = sources.winding->is_inside(point);
+        }
+        return is_inside ? std::uint8_t{1} : std::uint8_t{0};
     };
     if (!sources.solids_are_closed) {
         for (int i = 0; i < kSampleCount; ++i) {
@@ -125,14 +139,12 @@ void find_signs(const Sources& sources, const FieldLeaf& leaf, const LeafDistanc
         }
         return;
     }
-    constexpr double kSpacing = 1.0 + 1e-6, kOnSurface = 1e-7;
+    constexpr double kSpacing = 1.0 + 1e-6;
     std::array<std::uint8_t, kSampleCount> done{};
     std::array<std::int16_t, kSampleCount> queue;
     for (int start = 0; start < kSampleCount; ++start) {
         if (!leaf.is_active(start) || done[static_cast<std::size_t>(start)]) continue;
-        // On the surface itself there is no side to ask for.
-        const bool is_on_surface = distances.solid[static_cast<std::size_t>(start)] < kOnSurface;
-        const std::uint8_t side = is_on_surface ? std::uint8_t{0} : ask(start);
+        const std::uint8_t side = ask(start);
         std::size_t head = 0, tail = 0;
         queue[tail++] = static_cast<std::int16_t>(start);
         done[static_cast<std::size_t>(start)] = 1;
@@ -176,7 +188,8 @@ void fill_leaf(const Sources& sources, FieldLeaf& leaf) {
         const bool sheet_is_near = sources.has_sheets && shell < distances.solid[slot];
         const double magnitude =
             std::min(sheet_is_near ? shell : distances.solid[slot], static_cast<double>(kBandVoxels));
-        leaf.distance[slot] = static_cast<float>(inside[slot] ? -magnitude : magnitude);
+        // Inside stays inside: 0 counts as positive.
+        leaf.distance[slot] = static_cast<float>(inside[slot] ? -std::max(magnitude, kOnSurface) : magnitude);
         leaf.triangle[slot] = static_cast<std::int32_t>(sheet_is_near ? distances.sheet_triangle[slot]
                                                                       : distances.solid_triangle[slot]);
     }
@@ -348,8 +361,8 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
     }
     bool has_thin_walls = false;
     if (sources.has_solids) {
-        const ThinWalls walls =
-            find_thin_walls(sources.corners, components, *sources.solids, LeafMap(field.leaves));
+        const ThinWalls walls = find_thin_walls(sources.corners, components, *sources.solids,
+                                                *sources.winding, LeafMap(field.leaves));
         has_thin_walls = !walls.pieces.empty();
         if (has_thin_walls) {
             thicken(walls, field.leaves);

@@ -22,6 +22,10 @@ constexpr double kNeededDepth = 0.1;
 /// A value of the field, in voxels, that a wall of kSafeThickness has at its middle.
 constexpr double kClearlyInside = 0.9;
 
+/// Where a piece's outer side is asked for, in voxels off it: inside there, it lies within another solid and
+/// bounds nothing.
+constexpr double kOutside = 1e-3;
+
 struct Piece {
     Triangle triangle;
     double thickness = 0.0;
@@ -58,7 +62,7 @@ void cut(const Triangle& triangle, std::vector<Piece>& pieces) {
 }  // namespace
 
 ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vector<Component>& components,
-                          const TriangleBvh& solids, const LeafMap& field) {
+                          const TriangleBvh& solids, const WindingNumber& winding, const LeafMap& field) {
     std::vector<std::uint32_t> solid_triangles;
     std::vector<std::uint8_t> inverted;
     for (const Component& component : components) {
@@ -86,13 +90,19 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
                 // A voxel below the surface and still a voxel from any: thick, without asking further.
                 double depth = 0.0;
                 if (field.interpolate(center + inward, depth) && depth < -kClearlyInside) continue;
-                const FirstHit other = solids.first_hit(center, inward, 1e-9, kSafeThickness);
+                FirstHit other = solids.first_hit(center, inward, 1e-9, kSafeThickness);
+                // What lies within another solid is no end of the wall.
+                while (other.t < kSafeThickness &&
+                       winding.is_inside(center + (other.t + kOutside) * inward)) {
+                    other = solids.first_hit(center, inward, other.t + kOutside, kSafeThickness);
+                }
                 piece.thickness = other.t;
                 if (!(piece.thickness < kSafeThickness)) continue;
                 const glm::dvec3 facing = glm::normalize(corners[other.triangle].scaled_normal());
                 piece.is_wall = std::abs(glm::dot(facing, inward)) > kParallelCosine;
                 if (!field.interpolate(center + 0.5 * piece.thickness * inward, depth)) continue;
-                if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness)) {
+                if (depth > -std::min(kNeededDepth, 0.25 * piece.thickness) &&
+                    !winding.is_inside(center - kOutside * inward)) {
                     missing[i].push_back(piece);
                 }
             }

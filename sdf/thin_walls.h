@@ -10,6 +10,7 @@
 #include "sdf/band.h"
 #include "sdf/clean_mesh.h"
 #include "sdf/triangle_bvh.h"
+#include "sdf/winding_number.h"
 
 namespace sdf {
 
@@ -34,9 +35,9 @@ struct ThinWalls {
 inline constexpr double kSafeThickness = 2.0;
 
 /// @param corners the clean triangles in voxels; @param components their classes.
-/// @param solids tree over the solid ones; @param field distances in voxels, sheets not yet thickened by thin
-/// walls.
+/// @param solids tree over the solid ones; @param winding of them; @param field distances in voxels, sheets
+/// not yet thickened by thin walls.
 ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vector<Component>& components,
-                          const TriangleBvh& solids, const LeafMap& field);
+                          const TriangleBvh& solids, const WindingNumber& winding, const LeafMap& field);
 
 }  // namespace sdf
