@@ -91,13 +91,13 @@ TEST(Case07, SpheresThatNearlyTouchStayApart) {
 }
 
 TEST(Case07, ARayDownTheGapPasses) {
-    const core::Mesh ball = icosphere(5);
+    const core::Mesh ball = icosphere(4);
     for (const double gap : {1.1, 1.5, 2.0, 3.0}) {
         const double h = 1.0 / 12.0, half = 0.5 * gap * h;
         // Shifted, so that the gap lies anywhere between samples, and turned.
         std::size_t blocked[3] = {}, count = 0;
         TestRandom random(5);
-        for (int turn = 0; turn < ray_count(6, 40); ++turn) {
+        for (int turn = 0; turn < ray_count(3, 40); ++turn) {
             const glm::dmat4 matrix =
                 turn == 0 ? glm::dmat4(1.0) : rotation(random.uniform(0.0, 3.0), random.direction());
             const core::Mesh both = moved(merged(moved(ball, translation({-1.0 - half, 0, 0})),
@@ -167,37 +167,33 @@ TEST(Case09, FlippedFacesSpoilFewSigns) {
 TEST(Case10, FinsAndCracksSpoilOnlyTheirOwnNeighbourhood) {
     const core::Mesh ball = icosphere(3);
     const double width = 2e-4;  // 1e-4 of the extent.
-    // Cracks: every triangle of a part of the sphere shrinks away from its neighbours.
-    std::vector<glm::vec3> positions;
-    std::vector<glm::uvec3> triangles;
-    for (const glm::uvec3& corner : ball.triangles) {
-        const glm::vec3 a = ball.positions[corner.x], b = ball.positions[corner.y],
-                        c = ball.positions[corner.z];
-        const glm::vec3 middle = (a + b + c) / 3.0f;
-        const auto first = static_cast<std::uint32_t>(positions.size());
-        for (const glm::vec3& p : {a, b, c}) {
-            const glm::vec3 inward = middle - p;
-            const bool is_cracked = middle.y > 0.5f;
-            positions.push_back(is_cracked ? p + float(0.5 * width) * glm::normalize(inward) : p);
-        }
-        triangles.emplace_back(first, first + 1, first + 2);
+    // Cracks: at a tenth of the triangles one corner draws back from its neighbours. The mesh stays in one
+    // piece.
+    core::Mesh cracked = ball;
+    TestRandom random(3);
+    for (glm::uvec3& corner : cracked.triangles) {
+        if (random.uniform() > 0.1) continue;
+        const glm::vec3 p = ball.positions[corner.x];
+        const glm::vec3 middle = 0.5f * (ball.positions[corner.y] + ball.positions[corner.z]);
+        corner.x = static_cast<std::uint32_t>(cracked.positions.size());
+        cracked.positions.push_back(p + float(width) * glm::normalize(middle - p));
     }
-    const core::Mesh cracked = make_mesh("cracked", positions, {}, {}, triangles);
+    cracked = make_mesh("cracked", cracked.positions, {}, {}, cracked.triangles);
     // Fins: triangles that stand on edges of the sphere, three faces an edge, 1e-4 high.
     core::Mesh finned = ball;
     for (std::size_t i = 0; i < ball.triangles.size(); i += 5) {
         const glm::uvec3 corner = ball.triangles[i];
         const glm::vec3 a = ball.positions[corner.x], b = ball.positions[corner.y];
         const auto tip = static_cast<std::uint32_t>(finned.positions.size());
-        finned.positions.push_back(glm::normalize(a + b) * (1.0f + (i % 2 ? 1.0f : -1.0f) * float(width)));
+        const glm::vec3 middle = 0.5f * (a + b);
+        finned.positions.push_back(middle + (i % 2 ? 1.0f : -1.0f) * float(width) * glm::normalize(middle));
         finned.triangles.emplace_back(corner.x, corner.y, tip);
     }
     finned = make_mesh("finned", finned.positions, {}, {}, finned.triangles);
     for (const core::Mesh* mesh : std::initializer_list<const core::Mesh*>{&cracked, &finned}) {
         const sdf::SampledField field = bake(*mesh, 40);
         EXPECT_NE(field.info.mesh_class, sdf::MeshClass::kSheet) << mesh->name;
-        // Farther than twice the width from the surface. Where a crack's component is a sheet, its shell is
-        // positive inside as well; a solid is what is asked for.
+        // Farther than twice the width from the surface.
         const SignCount count = count_wrong_signs(field, ball, 2.0 * width / field.info.voxel_size);
         EXPECT_GT(count.samples, 10'000u);
         EXPECT_EQ(count.wrong, 0u) << mesh->name << ", of " << count.samples;

@@ -217,6 +217,24 @@ TEST(Case33, ASurfaceOnSamplesIsOneHitACrossing) {
     });
 }
 
+TEST(Case33, ASurfaceInTheJointOfABrickAndAnEmptyBlockIsNotLost) {
+    // Boxes of every size, so that some face lies between a brick and a block that holds nothing else.
+    for (int half = 12; half <= 25; ++half) {
+        const double h = 1.0 / 32;
+        const BakedScene baked(scene_of(box(glm::vec3(static_cast<float>(half * h)))), 2 * half);
+        TestRandom random(6);
+        std::vector<core::Ray> rays;
+        for (int i = 0; i < ray_count(2'000, 100'000); ++i) {
+            const double reach = (half - 1.0) * h;
+            rays.push_back(make_ray(
+                {random.uniform(-reach, reach), random.uniform(-reach, reach), random.uniform(-reach, reach)},
+                random.direction()));
+        }
+        SCOPED_TRACE(half);
+        expect_agreement(baked, stream_of(rays));
+    }
+}
+
 TEST(Case36, EpsConvergesToCubic) {
     // The eps of the mode is a constant, 0.1 voxels. What converges is the voxel: what eps and secant are off
     // falls with it.
