@@ -52,7 +52,7 @@ TEST(Case19, ShippedScenesExhaustNoRay) {
 
 TEST(Case37, FramesAgreeWithTriangles) {
     const core::Camera camera = camera_at({1.5, 1.8, 3.2}, {0, 0.3, 0});
-    const int side = ray_count(96, 512);
+    const int side = ray_count(96, 256);
     for (const int resolution : {48, 96}) {
         const BakedScene baked(still_life(), resolution);
         const core::TriangleTracer triangles(baked.scene());
