@@ -378,23 +378,20 @@ HWY_INLINE HWY_ATTR void walk(const FieldTable& fields, const MarchRay* rays, Ma
     Packet packets[kPackets];
     const std::size_t lanes = hn::Lanes(kFloat);
     std::size_t next = 0, busy = 0;
+    // Whether there was a ray left for the lane.
     const auto refill = [&](Packet& p, std::size_t lane) HWY_ATTR {
         if (next == count) {
-            if (p.is_busy[lane]) --busy;
             idle_lane(p, lane);
-            return;
+            return false;
         }
         const std::uint32_t number = resumed ? resumed[next] : static_cast<std::uint32_t>(next);
         load_lane(p, lane, rays[number], number);
         if (resumed) resume_lane(p, lane, hits[number], true);
         ++next;
+        return true;
     };
     for (Packet& p : packets) {
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-            p.is_busy[lane] = false;
-            if (next < count) ++busy;
-            refill(p, lane);
-        }
+        for (std::size_t lane = 0; lane < lanes; ++lane) busy += refill(p, lane);
         fetch(fields, p);
     }
     while (busy > 0) {
@@ -413,7 +410,7 @@ HWY_INLINE HWY_ATTR void walk(const FieldTable& fields, const MarchRay* rays, Ma
                                                                        : MarchStatus::kMiss;
                     store_lane(p, lane, status, is_hit ? p.hit_s[lane] : p.s[lane], hits[p.ray[lane]]);
                     if (is_candidate) candidates.push_back(p.ray[lane]);
-                    refill(p, lane);
+                    if (!refill(p, lane)) --busy;
                 }
             }
             fetch(fields, p);
