@@ -65,8 +65,10 @@ namespace {
 inline bool is_valid(float origin_sum, float length_squared, float t_min, float t_max) {
     constexpr float kLargest = std::numeric_limits<float>::max();
     // Written so that a NaN anywhere makes the comparison false.
-    return (std::abs(length_squared - 1.0f) <= 2e-3f) & (std::abs(origin_sum) <= kLargest) &
-           (std::abs(t_min) <= kLargest) & (t_min <= t_max);
+    const int is_unit = std::abs(length_squared - 1.0f) <= 2e-3f,
+              is_finite = std::abs(origin_sum) <= kLargest, starts = std::abs(t_min) <= kLargest,
+              is_ordered = t_min <= t_max;
+    return (is_unit & is_finite & starts & is_ordered) != 0;
 }
 
 }  // namespace

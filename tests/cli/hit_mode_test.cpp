@@ -70,7 +70,7 @@ TEST_F(HitModeFlag, TheHelpSaysWhatModesCostAndGive) {
     for (const char* verb : {"render", "compare"}) {
         const std::string help = run_program({verb, "--help"}).out;
         EXPECT_NE(help.find("--hit-mode"), std::string::npos) << verb;
-        EXPECT_NE(help.find("0.003"), std::string::npos) << verb;
+        EXPECT_NE(help.find("0.01 voxel"), std::string::npos) << verb;
     }
 }
 
