@@ -35,7 +35,7 @@ TEST(Case19, ShippedScenesExhaustNoRay) {
         const BakedScene baked(core::load_scene_file(assets_folder() / (std::string(name) + ".glb")), 64);
         const core::DoubleBounds bounds = core::world_bounds(baked.scene());
         const core::RayStream rays = random_lines(bounds.center(), 0.5 * glm::length(bounds.extent()),
-                                                  static_cast<std::size_t>(ray_count(10'000, 1'000'000)), 3);
+                                                  static_cast<std::size_t>(ray_count(10'000, 200'000)), 3);
         for_each_way([&](const Way& way) {
             const core::HitStream hits = trace_both(baked.tracer(way.mode), rays);
             std::size_t exhausted = 0, found = 0;
