@@ -128,6 +128,7 @@ HWY_ATTR void enter_fields(const core::RayStream& rays, const FieldPlacement* pl
             }
             to.length = length[lane];
             to.top_base = placement.top_base;
+            to.top_octant = placement.top_octant;
             to.top_stride_x = placement.top_stride_x;
             to.top_stride_y = placement.top_stride_y;
         }

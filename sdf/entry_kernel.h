@@ -19,7 +19,7 @@ struct FieldPlacement {
     double voxel_from_world[9];  ///< For directions, column by column.
     double voxel_origin[3];      ///< Voxel coordinates of the world's origin.
     double box[3];               ///< Rays are clipped to [0, box], in voxels.
-    std::int32_t top_base = 0, top_stride_x = 0, top_stride_y = 0, unused = 0;  ///< As in MarchRay.
+    std::int32_t top_base = 0, top_octant = 0, top_stride_x = 0, top_stride_y = 0;  ///< As in MarchRay.
 };
 
 /// Rays that are brought to the boxes of instances, one column a component, padded to whole vectors.

@@ -1,5 +1,5 @@
-// sdf/field_kernel-inl.h: rays in the lanes of vectors, and the trilinear cells they come to, for the
-// instruction set at hand. Included once for each by field_kernel.cpp alone.
+// sdf/field_kernel-inl.h: trilinear cells in the lanes of vectors, for the instruction set at hand. Included
+// once for each by field_kernel.cpp alone.
 #if defined(SDF_FIELD_KERNEL_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SDF_FIELD_KERNEL_INL_H
 #undef SDF_FIELD_KERNEL_INL_H
@@ -28,38 +28,8 @@ constexpr IntTag kInt;
 constexpr std::size_t kMostLanes = HWY_MAX_BYTES / sizeof(float);
 
 constexpr float kBlockCells = 7.0f;
-/// Bytes from a sample to its neighbours along y and x, and from brick to brick.
-constexpr int kSampleBytesY = 16, kSampleBytesX = 128, kLogBrickBytes = 10;
-/// Kept back from every step, in voxels: more than positions round within 4096 of them.
-constexpr float kStepMargin = 1e-3f;
+/// Stands for the inverse of 0: a ray in a plane never comes to the next one.
 constexpr float kHuge = 1e30f;
-
-/// The rays that the lanes of one vector work on. In memory: refilling a lane is a few stores.
-struct alignas(64) Packet {
-    float ox[kMostLanes], oy[kMostLanes], oz[kMostLanes];
-    float dx[kMostLanes], dy[kMostLanes], dz[kMostLanes];
-    float ix[kMostLanes], iy[kMostLanes], iz[kMostLanes];        ///< 1 / direction.
-    float up_x[kMostLanes], up_y[kMostLanes], up_z[kMostLanes];  ///< 1 where the direction is positive, or 0.
-    float length[kMostLanes];
-    float count_x[kMostLanes], count_y[kMostLanes], count_z[kMostLanes];
-    std::int32_t top_base[kMostLanes], stride_x[kMostLanes], stride_y[kMostLanes];
-    // Where the ray has come to.
-    float s[kMostLanes];
-    float cx[kMostLanes], cy[kMostLanes], cz[kMostLanes];
-    float sign[kMostLanes];      ///< +1 or -1 once the ray has come to a brick; 0 before.
-    float searched[kMostLanes];  ///< 1 where its cell is known to hold no crossing.
-    std::int32_t steps[kMostLanes];
-    std::int32_t step_cap[kMostLanes];
-    // What fetch() found there.
-    float block_x[kMostLanes], block_y[kMostLanes], block_z[kMostLanes];  ///< Lowest corner.
-    std::int32_t entry[kMostLanes];
-    std::int32_t w00[kMostLanes], w01[kMostLanes], w10[kMostLanes], w11[kMostLanes];  ///< Along x and y.
-    // What advance() found.
-    float hit_s[kMostLanes];
-
-    std::uint32_t ray[kMostLanes];
-    bool is_busy[kMostLanes];
-};
 
 /// The eight corners of a cell, in steps of the samples.
 struct Corners {
@@ -101,6 +71,24 @@ HWY_INLINE HWY_ATTR Mask is_negative(Floats value) {
 }
 HWY_INLINE HWY_ATTR Mask differ(Mask a, Mask b) {
     return hn::Xor(a, b);
+}
+HWY_INLINE HWY_ATTR Floats unit_clamped(Floats x) {
+    return hn::Min(hn::Max(x, hn::Zero(kFloat)), hn::Set(kFloat, 1.0f));
+}
+
+HWY_INLINE HWY_ATTR std::uint64_t bits_of(Mask mask) {
+    std::uint64_t bits = 0;
+    hn::StoreMaskBits(kFloat, mask, reinterpret_cast<std::uint8_t*>(&bits));
+    return bits;
+}
+
+/// A vector of three components.
+struct Point {
+    Floats x, y, z;
+};
+
+HWY_INLINE HWY_ATTR Point along(const Point& origin, const Point& direction, Floats s) {
+    return {origin.x + s * direction.x, origin.y + s * direction.y, origin.z + s * direction.z};
 }
 
 /// The first place in [0, 1] where the cubic has another sign than the ray brings along.

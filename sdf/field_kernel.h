@@ -1,8 +1,9 @@
 // sdf/field_kernel.h: many rays through distance fields at once, in whatever vectors the processor has.
 //
 // The vectorised twin of RayMarch: it finds where a ray first crosses the surface of a field. Every lane is a
-// ray of its own, and a lane whose ray has ended takes the next one from the queue. No vector type and no
-// instruction set shows here; the widest that the processor has is chosen at run time.
+// ray of its own, and a lane whose ray has ended takes the next one from the queue. Rays cross empty space
+// from box to box (skip_boxes.h), and the cells that they then come to are searched many at once. No vector
+// type and no instruction set shows here; the widest that the processor has is chosen at run time.
 //
 // The sign of the field is carried along each ray from sample to sample, so that a crossing is seen as a
 // change of sign however the positions round: cells, bricks and blocks meet without gaps.
@@ -20,8 +21,9 @@ namespace sdf {
 
 /// How a crossing is found: the dial between accuracy and time.
 enum class HitMode : std::uint8_t {
-    kEps,     ///< The first sample nearer than kHitEpsVoxels, moved by one secant.
-    kSecant,  ///< A change of sign over a cell, then false positions.
+    kEps,     ///< Where a cell ends nearer than kHitEpsVoxels and the ray comes nearer still, or a change of
+              ///< sign over a cell, then two false positions.
+    kSecant,  ///< A change of sign over a cell, then three false positions.
     kCubic,   ///< The first root of the cell's cubic: the exact surface of the trilinear field.
 };
 
@@ -29,25 +31,25 @@ enum class HitMode : std::uint8_t {
 inline constexpr float kHitEpsVoxels = 0.1f;
 
 inline constexpr int kBrickBits = 21;
-inline constexpr std::int32_t kBrickMask = (1 << kBrickBits) - 1;
 
 /// Fields of many meshes laid out for the kernel: blocks of 7^3 cells, those near the surface with a brick of
-/// 8^3 samples (see brick_grid.h for what an entry means).
+/// 8^3 samples (see brick_grid.h), and how far rays may skip (see skip_boxes.h).
 struct FieldTable {
-    /// Entries of all fields, by block. Negative: empty, as in BrickGrid. Else the brick's number over all
-    /// fields in kBrickBits bits, and above them, in 256ths less one, the part of a sample's distance that is
-    /// a safe step within the brick.
+    /// Entries of all fields, each by octant and block, as SkipBoxes::top; bricks numbered over all fields.
     const std::int32_t* top = nullptr;
+    const std::uint32_t* boxes = nullptr;   ///< As SkipBoxes::boxes.
+    const std::uint32_t* slabs = nullptr;   ///< As SkipBoxes::slabs.
     const std::int16_t* samples = nullptr;  ///< kBrickSize a brick, as in Brick, and one more in all.
 };
 
 /// A ray in the voxels of one field, and where that field lies in the table.
-struct MarchRay {
+struct alignas(64) MarchRay {
     float origin[3];        ///< Within the field's box.
     float direction[3];     ///< Unit length; components under 1e-20 are 0.
     float length;           ///< Voxels to the ray's end, or to where it leaves the box.
     std::int32_t top_base;  ///< First entry of the field.
-    std::int32_t top_stride_x, top_stride_y;
+    std::int32_t top_octant, top_stride_x,
+        top_stride_y;     ///< Entries from octant to octant, and block to block.
     float cell_count[3];  ///< Cells along each side of the box.
 };
 
@@ -60,7 +62,7 @@ struct MarchHit {
     std::int16_t cell[3];  ///< Within the field.
     MarchStatus status;
     bool enters_negative;  ///< From positive to negative values.
-    std::uint32_t steps;   ///< Cells and blocks visited.
+    std::uint32_t steps;   ///< Boxes crossed and cells searched.
 };
 
 /// Marches every ray to its first crossing. Each answer depends on its own ray alone, and is the same to the

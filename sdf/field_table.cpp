@@ -14,28 +14,6 @@ namespace sdf {
 
 namespace {
 
-/// The part of a sample's distance that may be stepped within a brick, in 256ths less one: 1 over the largest
-/// gradient of the trilinear field there. Along each axis that is at most the largest difference between
-/// neighbours of the cell; all three together are bounded by their root of squares.
-std::int32_t safe_part(const Brick& brick) {
-    double largest_squared = 1e-6;
-    for (int cell = 0; cell < kBrickCells * kBrickCells * kBrickCells; ++cell) {
-        const int first = Brick::index(cell / 49, cell / 7 % 7, cell % 7);
-        const auto difference = [&](int a, int b) {
-            return std::abs(static_cast<double>(brick.voxels(first + a)) - brick.voxels(first + b));
-        };
-        const double x =
-            std::max({difference(0, 64), difference(1, 65), difference(8, 72), difference(9, 73)});
-        const double y =
-            std::max({difference(0, 8), difference(1, 9), difference(64, 72), difference(65, 73)});
-        const double z =
-            std::max({difference(0, 1), difference(8, 9), difference(64, 65), difference(72, 73)});
-        largest_squared = std::max(largest_squared, x * x + y * y + z * z);
-    }
-    const double part = std::floor(256.0 / std::sqrt(largest_squared) * (1.0 - 1e-6)) - 1.0;
-    return static_cast<std::int32_t>(std::clamp(part, 0.0, 255.0));
-}
-
 /// The gradients at the corners of a brick's occupied cells; nobody asks for others.
 void copy_gradients(const BrickGrid& grid, const glm::ivec3& block, const Brick& brick, std::int32_t* to) {
     std::bitset<kBrickSize> wanted;
@@ -68,11 +46,12 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
         place.top_base = static_cast<std::int32_t>(top_size);
         place.brick_base = static_cast<std::int32_t>(brick_count);
         place.triangle_base = static_cast<std::int32_t>(triangle_count);
+        place.octant_stride = static_cast<std::int32_t>(grid.top().size());
         place.stride_x = grid.block_count().y * grid.block_count().z;
         place.stride_y = grid.block_count().z;
         place.cell_count = glm::vec3(grid.traced_voxels().maximum);
         palette_bases[i] = palette_size;
-        top_size += grid.top().size();
+        top_size += kOctants * grid.top().size();
         brick_count += grid.brick_count();
         palette_size += grid.palettes().size();
         triangle_count += meshes[i].triangles.size();
@@ -88,6 +67,8 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
     }
     top_.resize(top_size);
     // Samples and entries are read in pairs: the last ones must have a neighbour.
+    boxes_.resize(brick_count * kBrickBoxes);
+    slabs_.resize(brick_count * kBrickSlabs);
     samples_.resize(brick_count * kBrickSize + 1);
     palette_entries_.resize(brick_count * kBrickSize + 1);
     gradients_.resize(brick_count * kBrickSize);
@@ -101,11 +82,13 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
 
 void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place,
                            std::size_t palette_base) {
-    std::transform(grid.top().begin(), grid.top().end(), top_.begin() + place.top_base,
-                   [&](std::int32_t entry) {
-                       if (entry < 0) return entry;
-                       return (entry + place.brick_base) | safe_part(grid.brick_at(entry)) << kBrickBits;
-                   });
+    const SkipBoxes skip(grid);
+    std::transform(skip.top.begin(), skip.top.end(), top_.begin() + place.top_base,
+                   [&](std::int32_t entry) { return entry < 0 ? entry : entry + place.brick_base; });
+    std::copy(skip.boxes.begin(), skip.boxes.end(),
+              boxes_.begin() + static_cast<std::ptrdiff_t>(place.brick_base) * kBrickBoxes);
+    std::copy(skip.slabs.begin(), skip.slabs.end(),
+              slabs_.begin() + static_cast<std::ptrdiff_t>(place.brick_base) * kBrickSlabs);
     std::transform(
         grid.palettes().begin(), grid.palettes().end(),
         palettes_.begin() + static_cast<std::ptrdiff_t>(palette_base),
@@ -145,6 +128,7 @@ void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const 
 
 std::size_t FieldAtlas::bytes() const {
     return places_.capacity() * sizeof(Place) + top_.capacity() * sizeof(top_[0]) +
+           (boxes_.capacity() + slabs_.capacity()) * sizeof(boxes_[0]) +
            samples_.capacity() * sizeof(samples_[0]) + gradients_.capacity() * sizeof(gradients_[0]) +
            palette_entries_.capacity() * sizeof(palette_entries_[0]) +
            (palette_first_.capacity() + palettes_.capacity()) * sizeof(palettes_[0]) +

@@ -10,6 +10,7 @@
 #include "core/scene/scene.h"
 #include "sdf/brick_grid.h"
 #include "sdf/field_kernel.h"
+#include "sdf/skip_boxes.h"
 #include "sdf/surface_kernel.h"
 
 namespace sdf {
@@ -22,7 +23,7 @@ public:
         std::int32_t top_base = 0;
         std::int32_t brick_base = 0;
         std::int32_t triangle_base = 0;
-        std::int32_t stride_x = 0, stride_y = 0;
+        std::int32_t octant_stride = 0, stride_x = 0, stride_y = 0;  ///< Of top entries.
         glm::vec3 cell_count{0.0f};
     };
 
@@ -34,7 +35,7 @@ public:
     FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids, std::span<const core::Mesh> meshes);
 
     const Place& place(std::size_t grid) const { return places_[grid]; }
-    FieldTable table() const { return {top_.data(), samples_.data()}; }
+    FieldTable table() const { return {top_.data(), boxes_.data(), slabs_.data(), samples_.data()}; }
     SurfaceTable surface_table() const {
         return {gradients_.data(), palette_entries_.data(), palette_first_.data(), palettes_.data(),
                 triangles_.data()};
@@ -54,6 +55,7 @@ private:
 
     std::vector<Place> places_;
     std::vector<std::int32_t> top_;
+    std::vector<std::uint32_t> boxes_, slabs_;
     std::vector<std::int16_t> samples_;
     std::vector<std::int32_t> gradients_;
     std::vector<std::uint16_t> palette_entries_;

@@ -45,6 +45,7 @@ FieldPlacement placement_of(const SdfTracer::PlacedGrid& placed) {
         placement.box[axis] = placed.grid->traced_voxels().maximum[axis];
     }
     placement.top_base = placed.place.top_base;
+    placement.top_octant = placed.place.octant_stride;
     placement.top_stride_x = placed.place.stride_x;
     placement.top_stride_y = placed.place.stride_y;
     return placement;

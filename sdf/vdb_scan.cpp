@@ -415,8 +415,8 @@ private:
         if (size > 0) {
             const Bytes chunk = take(static_cast<std::uint64_t>(size));
             if (compression_ & kBlosc) check_blosc(chunk, byte_count);
-        } else if (size != -static_cast<std::int64_t>(byte_count)) {
-            fail(fmt::format("a chunk holds {} bytes; {} are right", -size, byte_count));
+        } else if (const std::uint64_t plain = 0 - static_cast<std::uint64_t>(size); plain != byte_count) {
+            fail(fmt::format("a chunk holds {} bytes; {} are right", plain, byte_count));
         } else {
             take(byte_count);
         }

@@ -47,6 +47,7 @@ protected:
             place.box[axis] = grid_->traced_voxels().maximum[axis];
         }
         place.top_base = atlas_.place(0).top_base;
+        place.top_octant = atlas_.place(0).octant_stride;
         place.top_stride_x = atlas_.place(0).stride_x;
         place.top_stride_y = atlas_.place(0).stride_y;
         return place;

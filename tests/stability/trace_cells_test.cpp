@@ -71,6 +71,7 @@ public:
             }
             march.length = static_cast<float>(t_max - t_min);
             march.top_base = place.top_base;
+            march.top_octant = place.octant_stride;
             march.top_stride_x = place.stride_x;
             march.top_stride_y = place.stride_y;
             march_rays.push_back(march);

@@ -1,0 +1,52 @@
+// sdf/skip_boxes.h: how far rays may go through a field without looking at it, by the way they run.
+//
+// A brick of 7^3 cells is cut into 3^3 regions of two, two and three cells a side. For every region, every
+// empty block and each of the eight octants of directions there is a box that begins there, reaches in that
+// direction, and holds no occupied cell: a ray that leaves a wall crosses the room in one step. Regions with
+// occupied cells have a slab instead, between two parallel planes, that holds all of the surface there: a ray
+// that does not come into it cannot meet the surface. Both are rigorous for the trilinear surface.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sdf/brick_grid.h"
+
+namespace sdf {
+
+inline constexpr int kOctants = 8;
+
+/// Regions along one side of a brick, and in all. Region i begins at cell 2 i; the last has three cells.
+inline constexpr int kBrickRegions = 3;
+inline constexpr int kRegions = kBrickRegions * kBrickRegions * kBrickRegions;
+
+/// Words a brick in SkipBoxes::boxes and SkipBoxes::slabs.
+inline constexpr int kBrickBoxes = kOctants * kRegions;
+inline constexpr int kBrickSlabs = 2 * kRegions;
+
+/// Slabs lie between values of (normal . position) in steps of 1 / kSlabSteps; normals are 127 long.
+inline constexpr float kSlabSteps = 16.0f;
+
+/// A box is one word: kEmptyBox where it holds no occupied cell, and along x, y and z the cells from its
+/// block's near side (as the ray comes) to the box's far side, ten bits each, x highest.
+inline constexpr std::uint32_t kEmptyBox = 0x80000000u;
+inline constexpr int kBoxBits = 10;
+inline constexpr int kMostBoxCells = (1 << kBoxBits) - 1;
+
+/// The boxes and slabs of one field.
+struct SkipBoxes {
+    /// By octant, then block as in BrickGrid::top(): the box of an empty block, or a brick's number. Octant:
+    /// bit 2 where directions along x are negative, bit 1 y, bit 0 z.
+    std::vector<std::int32_t> top;
+    /// By brick, octant, region (x slowest).
+    std::vector<std::uint32_t> boxes;
+    /// By brick and region, two words: the normal's components in the three lowest bytes, signed; the slab's
+    /// lower and upper end in the halves, signed. Of positions from the brick's lowest corner, voxels.
+    std::vector<std::uint32_t> slabs;
+
+    explicit SkipBoxes(const BrickGrid& grid);
+};
+
+}  // namespace sdf
