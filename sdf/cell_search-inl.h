@@ -30,7 +30,7 @@ struct Candidates {
     alignas(64) float next_s[kCapacity], next_x[kCapacity], next_y[kCapacity], next_z[kCapacity];
     std::size_t size = 0;
 
-    HWY_INLINE HWY_ATTR void push(const Packet& p, std::size_t lane) {
+    HWY_INLINE HWY_ATTR void push(const FieldTable& fields, const Packet& p, std::size_t lane) {
         ray[size] = static_cast<std::int32_t>(p.ray[lane]);
         brick[size] = p.brick[lane];
         steps[size] = p.steps[lane];
@@ -45,6 +45,13 @@ struct Candidates {
         next_y[size] = p.cy[lane];
         next_z[size] = p.cz[lane];
         ++size;
+        const float sample = (p.slab_cx[lane] - p.block_x[lane]) * 64.0f +
+                             (p.slab_cy[lane] - p.block_y[lane]) * 8.0f + (p.slab_cz[lane] - p.block_z[lane]);
+        const std::int16_t* corner = fields.samples +
+                                     static_cast<std::ptrdiff_t>(p.brick[lane]) * kBrickSize +
+                                     static_cast<int>(sample);
+        __builtin_prefetch(corner);
+        __builtin_prefetch(corner + kSampleBytesX / 2);
     }
     /// Moves one to an earlier place.
     HWY_INLINE HWY_ATTR void move(std::size_t from, std::size_t to) {

@@ -71,7 +71,7 @@ HWY_INLINE HWY_ATTR void march_all(const FieldTable& fields, const MarchRay* ray
                         const auto lane = static_cast<std::size_t>(__builtin_ctzll(bits));
                         if (!p.is_busy[lane]) continue;
                         if (at_surface >> lane & 1) {
-                            candidates.push(p, lane);
+                            candidates.push(fields, p, lane);
                         } else {
                             const bool is_exhausted = exhausted >> lane & 1;
                             store_end(p, lane, is_exhausted ? MarchStatus::kExhausted : MarchStatus::kMiss,

@@ -38,7 +38,6 @@ struct FieldTable {
     /// Entries of all fields, each by octant and block, as SkipBoxes::top; bricks numbered over all fields.
     const std::int32_t* top = nullptr;
     const std::uint32_t* boxes = nullptr;   ///< As SkipBoxes::boxes.
-    const std::uint32_t* slabs = nullptr;   ///< As SkipBoxes::slabs.
     const std::int16_t* samples = nullptr;  ///< kBrickSize a brick, as in Brick, and one more in all.
 };
 

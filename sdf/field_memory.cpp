@@ -9,13 +9,13 @@ FieldMemory field_memory(const BrickGrid& grid, std::size_t triangle_count) {
     FieldMemory memory;
     memory.samples = grid.bytes();
     if (!grid.traced_voxels().empty()) {
-        // As FieldAtlas lays it out: a sample, its triangle and its gradient; a palette's first entry; what
-        // rays may skip.
+        // As FieldAtlas lays it out: samples and boxes of a brick, what its occupied cells know, the top
+        // grid.
         constexpr std::size_t kAtlasBrick =
-            kBrickSize * (sizeof(std::int16_t) + sizeof(std::uint16_t) + sizeof(std::int32_t)) +
-            sizeof(std::int32_t) + (kBrickBoxes + kBrickSlabs) * sizeof(std::uint32_t);
+            kBrickSize * sizeof(std::int16_t) + kBrickBoxes * sizeof(std::uint32_t) + sizeof(BrickCells);
         memory.samples += sizeof(FieldAtlas::Place) + grid.brick_count() * kAtlasBrick +
-                          (kOctants * grid.top().size() + grid.palettes().size()) * sizeof(std::int32_t);
+                          occupied_count(grid) * sizeof(CellSurface) +
+                          kOctants * grid.top().size() * sizeof(std::int32_t);
         memory.triangles += triangle_count * sizeof(VoxelTriangle);
     }
     if (grid.half_thickness_voxels() > 0.0) memory.triangles += TriangleBvh::bytes_of(triangle_count);

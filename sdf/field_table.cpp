@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bitset>
+#include <array>
+#include <bit>
 #include <cmath>
 
 #include "core/support/error.h"
@@ -14,30 +15,70 @@ namespace sdf {
 
 namespace {
 
-/// The gradients at the corners of a brick's occupied cells; nobody asks for others.
-void copy_gradients(const BrickGrid& grid, const glm::ivec3& block, const Brick& brick, std::int32_t* to) {
-    std::bitset<kBrickSize> wanted;
-    for (int i = 0; i < kBrickSize; ++i) {
-        const glm::ivec3 cell(i / 64, i / 8 % 8, i % 8);
-        if (cell.x == kBrickCells || cell.y == kBrickCells || cell.z == kBrickCells) continue;
+int occupied_count(const Brick& brick) {
+    int count = 0;
+    for (const std::uint64_t layer : brick.occupied) count += std::popcount(layer);
+    return count;
+}
+
+/// What the brick's cells know, from `to` on in the order of its mask.
+/// @param triangle_base of the field, over all fields
+void copy_cells(const BrickGrid& grid, const glm::ivec3& block, const Brick& brick,
+                std::int32_t triangle_base, CellSurface* to) {
+    // Neighbours share corners.
+    constexpr std::int32_t kUnknown = -1;  // No gradient is stored so: its lowest bits are 0.
+    std::array<std::int32_t, kBrickSize> gradients;
+    gradients.fill(kUnknown);
+    for (int i = 0; i < kBrickCells * kBrickCells * kBrickCells; ++i) {
+        const glm::ivec3 cell(i / 49, i / 7 % 7, i % 7);
         if (!brick.is_occupied(cell.x, cell.y, cell.z)) continue;
+        std::fill(std::begin(to->triangle), std::end(to->triangle), -1);
+        std::int32_t* end = to->triangle;
         for (int corner = 0; corner < 8; ++corner) {
-            wanted[static_cast<std::size_t>(Brick::index(cell.x + (corner >> 2), cell.y + (corner >> 1 & 1),
-                                                         cell.z + (corner & 1)))] = true;
+            const int sample =
+                Brick::index(cell.x + (corner >> 2), cell.y + (corner >> 1 & 1), cell.z + (corner & 1));
+            std::int32_t& gradient = gradients[static_cast<std::size_t>(sample)];
+            if (gradient == kUnknown) gradient = stored_gradient(lattice_gradient(grid, block, sample));
+            to->gradient[corner] = gradient;
+            const std::uint32_t triangle = grid.triangle(brick, sample);
+            if (triangle == kNoTriangle) continue;
+            const std::int32_t number = static_cast<std::int32_t>(triangle) + triangle_base;
+            std::int32_t* place = std::lower_bound(to->triangle, end, number);
+            if (place != end && *place == number) continue;
+            std::copy_backward(place, end, end + 1);
+            *place = number;
+            ++end;
         }
+        ++to;
     }
-    for (int i = 0; i < kBrickSize; ++i) {
-        if (wanted[static_cast<std::size_t>(i)]) to[i] = stored_gradient(lattice_gradient(grid, block, i));
+}
+
+BrickCells brick_cells(const Brick& brick, std::size_t first) {
+    BrickCells cells;
+    cells.occupied = brick.occupied;
+    int before = 0;
+    for (std::size_t layer = 0; layer < brick.occupied.size(); ++layer) {
+        cells.before[layer] = static_cast<std::uint16_t>(before);
+        before += std::popcount(brick.occupied[layer]);
     }
+    cells.first = static_cast<std::int32_t>(first);
+    return cells;
 }
 
 }  // namespace
 
+std::size_t occupied_count(const BrickGrid& grid) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < grid.brick_count(); ++i) {
+        count += static_cast<std::size_t>(occupied_count(grid.brick_at(static_cast<std::int32_t>(i))));
+    }
+    return count;
+}
+
 FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
                        std::span<const core::Mesh> meshes)
     : places_(grids.size()) {
-    std::size_t top_size = 0, brick_count = 0, palette_size = 0, triangle_count = 0;
-    std::vector<std::size_t> palette_bases(grids.size());
+    std::size_t top_size = 0, brick_count = 0, cell_count = 0, triangle_count = 0;
     const auto is_empty = [&](std::size_t i) { return !grids[i] || grids[i]->traced_voxels().empty(); };
     for (std::size_t i = 0; i < grids.size(); ++i) {
         if (is_empty(i)) continue;
@@ -50,13 +91,14 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
         place.stride_x = grid.block_count().y * grid.block_count().z;
         place.stride_y = grid.block_count().z;
         place.cell_count = glm::vec3(grid.traced_voxels().maximum);
-        palette_bases[i] = palette_size;
+        place.cell_base = static_cast<std::int32_t>(cell_count);
         top_size += kOctants * grid.top().size();
         brick_count += grid.brick_count();
-        palette_size += grid.palettes().size();
+        cell_count += occupied_count(grid);
         triangle_count += meshes[i].triangles.size();
+        constexpr std::size_t kMostCells = (std::size_t{1} << 31) / 16;
         constexpr std::size_t kMostTriangles = (std::size_t{1} << 31) / 9;
-        if (brick_count > kMostBricks || top_size > (std::size_t{1} << 30) || palette_size > kMostTriangles ||
+        if (brick_count > kMostBricks || top_size > (std::size_t{1} << 30) || cell_count > kMostCells ||
             triangle_count > kMostTriangles) {
             throw core::InputError(
                 core::ErrorKind::kOutOfMemory,
@@ -66,33 +108,29 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
         }
     }
     top_.resize(top_size);
-    // Samples and entries are read in pairs: the last ones must have a neighbour.
     boxes_.resize(brick_count * kBrickBoxes);
-    slabs_.resize(brick_count * kBrickSlabs);
+    // Samples are read in pairs: the last one must have a neighbour.
     samples_.resize(brick_count * kBrickSize + 1);
-    palette_entries_.resize(brick_count * kBrickSize + 1);
-    gradients_.resize(brick_count * kBrickSize);
-    palette_first_.resize(brick_count);
-    palettes_.resize(palette_size);
+    bricks_.resize(brick_count);
+    cells_.resize(cell_count);
     triangles_.resize(triangle_count);
     for (std::size_t i = 0; i < grids.size(); ++i) {
-        if (!is_empty(i)) copy_grid(*grids[i], meshes[i], places_[i], palette_bases[i]);
+        if (!is_empty(i)) copy_grid(*grids[i], meshes[i], places_[i]);
     }
 }
 
-void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place,
-                           std::size_t palette_base) {
+void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place) {
     const SkipBoxes skip(grid);
     std::transform(skip.top.begin(), skip.top.end(), top_.begin() + place.top_base,
                    [&](std::int32_t entry) { return entry < 0 ? entry : entry + place.brick_base; });
     std::copy(skip.boxes.begin(), skip.boxes.end(),
               boxes_.begin() + static_cast<std::ptrdiff_t>(place.brick_base) * kBrickBoxes);
-    std::copy(skip.slabs.begin(), skip.slabs.end(),
-              slabs_.begin() + static_cast<std::ptrdiff_t>(place.brick_base) * kBrickSlabs);
-    std::transform(
-        grid.palettes().begin(), grid.palettes().end(),
-        palettes_.begin() + static_cast<std::ptrdiff_t>(palette_base),
-        [&](std::uint32_t triangle) { return static_cast<std::int32_t>(triangle) + place.triangle_base; });
+    auto first_cell = static_cast<std::size_t>(place.cell_base);
+    for (std::size_t i = 0; i < grid.brick_count(); ++i) {
+        const Brick& brick = grid.brick_at(static_cast<std::int32_t>(i));
+        bricks_[static_cast<std::size_t>(place.brick_base) + i] = brick_cells(brick, first_cell);
+        first_cell += static_cast<std::size_t>(occupied_count(brick));
+    }
     const glm::ivec3 count = grid.block_count();
     core::parallel_for(grid.top().size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
@@ -101,12 +139,10 @@ void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const 
             const auto number = static_cast<std::size_t>(place.brick_base + grid.top()[i]);
             const auto first = static_cast<std::ptrdiff_t>(number * kBrickSize);
             std::copy(brick.sample.begin(), brick.sample.end(), samples_.begin() + first);
-            std::copy(brick.palette_entry.begin(), brick.palette_entry.end(),
-                      palette_entries_.begin() + first);
-            palette_first_[number] = static_cast<std::int32_t>(palette_base + brick.palette_first);
             const auto at = static_cast<int>(i);
             const glm::ivec3 block(at / (count.y * count.z), at / count.z % count.y, at % count.z);
-            copy_gradients(grid, block, brick, gradients_.data() + first);
+            copy_cells(grid, block, brick, place.triangle_base,
+                       &cells_[static_cast<std::size_t>(bricks_[number].first)]);
         }
     });
     core::parallel_for(mesh.triangles.size(), 1024, [&](std::size_t begin, std::size_t end) {
@@ -128,10 +164,8 @@ void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const 
 
 std::size_t FieldAtlas::bytes() const {
     return places_.capacity() * sizeof(Place) + top_.capacity() * sizeof(top_[0]) +
-           (boxes_.capacity() + slabs_.capacity()) * sizeof(boxes_[0]) +
-           samples_.capacity() * sizeof(samples_[0]) + gradients_.capacity() * sizeof(gradients_[0]) +
-           palette_entries_.capacity() * sizeof(palette_entries_[0]) +
-           (palette_first_.capacity() + palettes_.capacity()) * sizeof(palettes_[0]) +
+           boxes_.capacity() * sizeof(boxes_[0]) + samples_.capacity() * sizeof(samples_[0]) +
+           bricks_.capacity() * sizeof(bricks_[0]) + cells_.capacity() * sizeof(cells_[0]) +
            triangles_.capacity() * sizeof(triangles_[0]);
 }
 

@@ -15,6 +15,9 @@
 
 namespace sdf {
 
+/// Cells of a field that hold a zero crossing.
+std::size_t occupied_count(const BrickGrid& grid);
+
 /// Top grids, samples and triangles of several grids, one after the other.
 class FieldAtlas {
 public:
@@ -22,6 +25,7 @@ public:
     struct Place {
         std::int32_t top_base = 0;
         std::int32_t brick_base = 0;
+        std::int32_t cell_base = 0;
         std::int32_t triangle_base = 0;
         std::int32_t octant_stride = 0, stride_x = 0, stride_y = 0;  ///< Of top entries.
         glm::vec3 cell_count{0.0f};
@@ -35,11 +39,8 @@ public:
     FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids, std::span<const core::Mesh> meshes);
 
     const Place& place(std::size_t grid) const { return places_[grid]; }
-    FieldTable table() const { return {top_.data(), boxes_.data(), slabs_.data(), samples_.data()}; }
-    SurfaceTable surface_table() const {
-        return {gradients_.data(), palette_entries_.data(), palette_first_.data(), palettes_.data(),
-                triangles_.data()};
-    }
+    FieldTable table() const { return {top_.data(), boxes_.data(), samples_.data()}; }
+    SurfaceTable surface_table() const { return {bricks_.data(), cells_.data(), triangles_.data()}; }
     /// By its number over all fields.
     const VoxelTriangle& triangle(std::int32_t number) const {
         return triangles_[static_cast<std::size_t>(number)];
@@ -50,16 +51,14 @@ public:
     static constexpr std::size_t kMostBricks = std::size_t{1} << kBrickBits;
 
 private:
-    void copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place,
-                   std::size_t palette_base);
+    void copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place);
 
     std::vector<Place> places_;
     std::vector<std::int32_t> top_;
-    std::vector<std::uint32_t> boxes_, slabs_;
+    std::vector<std::uint32_t> boxes_;
     std::vector<std::int16_t> samples_;
-    std::vector<std::int32_t> gradients_;
-    std::vector<std::uint16_t> palette_entries_;
-    std::vector<std::int32_t> palette_first_, palettes_;
+    std::vector<BrickCells> bricks_;
+    std::vector<CellSurface> cells_;
     std::vector<VoxelTriangle> triangles_;
 };
 

@@ -43,7 +43,7 @@ struct alignas(64) Packet {
     float block_x[kMostLanes], block_y[kMostLanes], block_z[kMostLanes];  ///< Lowest corner.
     std::int32_t brick[kMostLanes];                                       ///< Negative: the block is empty.
     std::int32_t box[kMostLanes];
-    std::int32_t slab_normal[kMostLanes], slab_ends[kMostLanes];
+    float region_x[kMostLanes], region_y[kMostLanes], region_z[kMostLanes];  ///< Of the brick.
     // What advance() found: the part of the ray that lies in a slab, and where it begins.
     float slab_s[kMostLanes], slab_end[kMostLanes];
     float slab_cx[kMostLanes], slab_cy[kMostLanes], slab_cz[kMostLanes];
@@ -78,19 +78,19 @@ HWY_INLINE HWY_ATTR void fetch(const FieldTable& fields, Packet& p) {
     const auto region = [&](Floats cell, Floats block) HWY_ATTR {
         return hn::Min(hn::Floor((cell - block) * half), hn::Set(kFloat, kBrickRegions - 1));
     };
-    const Floats number = (region(cx, block_x) * hn::Set(kFloat, kBrickRegions * kBrickRegions) +
-                           region(cy, block_y) * hn::Set(kFloat, kBrickRegions)) +
-                          region(cz, block_z);
+    const Floats region_x = region(cx, block_x), region_y = region(cy, block_y),
+                 region_z = region(cz, block_z);
+    hn::Store(region_x, kFloat, p.region_x);
+    hn::Store(region_y, kFloat, p.region_y);
+    hn::Store(region_z, kFloat, p.region_z);
+    const Floats number = (region_x * hn::Set(kFloat, kBrickRegions * kBrickRegions) +
+                           region_y * hn::Set(kFloat, kBrickRegions)) +
+                          region_z;
     // Empty blocks read the first brick.
-    const Ints some_brick = hn::Max(brick, hn::Zero(kInt)), some_region = hn::ConvertTo(kInt, number);
-    const Ints box_index =
-        some_brick * hn::Set(kInt, kBrickBoxes) + (hn::Load(kInt, p.octant_boxes) + some_region);
-    const Ints slab_index = some_brick * hn::Set(kInt, kBrickSlabs) + hn::ShiftLeft<1>(some_region);
+    const Ints index = hn::Max(brick, hn::Zero(kInt)) * hn::Set(kInt, kBrickBoxes) +
+                       (hn::Load(kInt, p.octant_boxes) + hn::ConvertTo(kInt, number));
     const auto* boxes = reinterpret_cast<const std::int32_t*>(fields.boxes);
-    const auto* slabs = reinterpret_cast<const std::int32_t*>(fields.slabs);
-    hn::Store(hn::IfThenElse(is_brick, hn::GatherIndex(kInt, boxes, box_index), brick), kInt, p.box);
-    hn::Store(hn::GatherIndex(kInt, slabs, slab_index), kInt, p.slab_normal);
-    hn::Store(hn::GatherIndex(kInt, slabs + 1, slab_index), kInt, p.slab_ends);
+    hn::Store(hn::IfThenElse(is_brick, hn::GatherIndex(kInt, boxes, index), brick), kInt, p.box);
 }
 
 /// One axis of the way to a box's far side.
@@ -99,11 +99,21 @@ struct AxisExit {
     Floats s;     ///< Where the ray comes to the far side.
 };
 
-HWY_INLINE HWY_ATTR AxisExit exit_along(Ints cells, const float* block, const float* origin,
-                                        const float* inverse, const float* up) {
-    const Floats goes_up = hn::Load(kFloat, up), extent = hn::ConvertTo(kFloat, cells);
-    const Floats plane = hn::Load(kFloat, block) + hn::IfThenElse(hn::Gt(goes_up, hn::Zero(kFloat)), extent,
-                                                                  hn::Set(kFloat, kBlockCells) - extent);
+/// @param in_box cells from the block's near side to the far side of an empty box; @param is_occupied lanes
+/// with a slab instead, that reaches through the whole brick where is_wide
+HWY_INLINE HWY_ATTR AxisExit exit_along(Ints in_box, Mask is_occupied, Mask is_wide, const float* block,
+                                        const float* region, const float* origin, const float* inverse,
+                                        const float* up) {
+    const Floats goes_up = hn::Load(kFloat, up), seven = hn::Set(kFloat, kBlockCells),
+                 two = hn::Set(kFloat, 2.0f);
+    const Mask is_up = hn::Gt(goes_up, hn::Zero(kFloat));
+    const Floats number = hn::Load(kFloat, region), begin = two * number;
+    // The last region has three cells.
+    const Floats end = hn::IfThenElse(hn::Lt(number, two), begin + two, seven);
+    const Floats of_region = hn::IfThenElse(is_up, end, seven - begin);
+    const Floats extent =
+        hn::IfThenElse(is_occupied, hn::IfThenElse(is_wide, seven, of_region), hn::ConvertTo(kFloat, in_box));
+    const Floats plane = hn::Load(kFloat, block) + hn::IfThenElse(is_up, extent, seven - extent);
     return {plane - goes_up, (plane - hn::Load(kFloat, origin)) * hn::Load(kFloat, inverse)};
 }
 
@@ -119,11 +129,14 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
     const Ints box = hn::Load(kInt, p.box), extent_mask = hn::Set(kInt, kMostBoxCells);
     const Floats s = hn::Load(kFloat, p.s);
     const Floats cx = hn::Load(kFloat, p.cx), cy = hn::Load(kFloat, p.cy), cz = hn::Load(kFloat, p.cz);
-    const AxisExit x = exit_along(hn::And(hn::ShiftRight<2 * kBoxBits>(box), extent_mask), p.block_x, p.ox,
-                                  p.ix, p.up_x),
-                   y = exit_along(hn::And(hn::ShiftRight<kBoxBits>(box), extent_mask), p.block_y, p.oy, p.iy,
-                                  p.up_y),
-                   z = exit_along(hn::And(box, extent_mask), p.block_z, p.oz, p.iz, p.up_z);
+    const Mask is_occupied = hn::Not(hn::RebindMask(kFloat, hn::Lt(box, hn::Zero(kInt))));
+    const Mask is_wide = hn::RebindMask(kFloat, hn::TestBit(box, hn::Set(kInt, kWideSlab)));
+    const AxisExit x = exit_along(hn::And(hn::ShiftRight<2 * kBoxBits>(box), extent_mask), is_occupied,
+                                  is_wide, p.block_x, p.region_x, p.ox, p.ix, p.up_x),
+                   y = exit_along(hn::And(hn::ShiftRight<kBoxBits>(box), extent_mask), is_occupied, is_wide,
+                                  p.block_y, p.region_y, p.oy, p.iy, p.up_y),
+                   z = exit_along(hn::And(box, extent_mask), is_occupied, is_wide, p.block_z, p.region_z,
+                                  p.oz, p.iz, p.up_z);
     const Floats next = hn::Max(s, hn::Min(x.s, hn::Min(y.s, z.s)));
     const Mask across_x = hn::And(hn::Le(x.s, y.s), hn::Le(x.s, z.s));
     const Mask across_y = hn::AndNot(across_x, hn::Le(y.s, z.s));
@@ -147,19 +160,25 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
 
     Ended ended;
     ended.at_surface = hn::Lt(zero, zero);
-    const Mask is_occupied = hn::Not(hn::RebindMask(kFloat, hn::Lt(box, hn::Zero(kInt))));
     if (!hn::AllFalse(kFloat, is_occupied)) {
-        const Ints normal = hn::Load(kInt, p.slab_normal), ends = hn::Load(kInt, p.slab_ends);
-        const Floats steps = hn::Set(kFloat, kSlabSteps);
-        const Floats nx = hn::ConvertTo(kFloat, hn::ShiftRight<24>(hn::ShiftLeft<24>(normal))) * steps,
-                     ny = hn::ConvertTo(kFloat, hn::ShiftRight<24>(hn::ShiftLeft<16>(normal))) * steps,
-                     nz = hn::ConvertTo(kFloat, hn::ShiftRight<24>(hn::ShiftLeft<8>(normal))) * steps;
-        const Floats low = hn::ConvertTo(kFloat, hn::ShiftRight<16>(hn::ShiftLeft<16>(ends))),
-                     high = hn::ConvertTo(kFloat, hn::ShiftRight<16>(ends));
-        const Floats block_x = hn::Load(kFloat, p.block_x), block_y = hn::Load(kFloat, p.block_y),
-                     block_z = hn::Load(kFloat, p.block_z);
+        const auto field_of = [](Ints word) HWY_ATTR { return hn::ConvertTo(kFloat, word); };
+        const Ints byte_x = hn::ShiftRight<24>(hn::ShiftLeft<24>(box)),
+                   byte_y = hn::ShiftRight<24>(hn::ShiftLeft<16>(box));
+        const Floats per_step = hn::Set(kFloat, 1.0f / kSlabStep);
+        const Floats nx = field_of(byte_x), ny = field_of(byte_y);
+        const Floats nz = hn::Set(kFloat, kSlabNormal) - hn::Abs(nx) - hn::Abs(ny);
+        const Ints thickness = hn::And(hn::ShiftRight<24>(box), hn::Set(kInt, kMostSlabSteps));
+        const Mask has_bound = hn::RebindMask(kFloat, hn::Lt(thickness, hn::Set(kInt, kMostSlabSteps)));
+        const Floats begins =
+            field_of(hn::And(hn::ShiftRight<16>(box), hn::Set(kInt, 255)) - hn::Set(kInt, kSlabMiddle));
+        const Floats low = hn::IfThenElse(has_bound, begins, hn::Set(kFloat, -kHuge)),
+                     high = hn::IfThenElse(has_bound, begins + field_of(thickness), hn::Set(kFloat, kHuge));
+        const Floats middle = hn::Set(kFloat, 0.5f * kBlockCells);
+        const Floats middle_x = hn::Load(kFloat, p.block_x) + middle,
+                     middle_y = hn::Load(kFloat, p.block_y) + middle,
+                     middle_z = hn::Load(kFloat, p.block_z) + middle;
         const auto height = [&](const Point& at) HWY_ATTR {
-            return nx * (at.x - block_x) + ny * (at.y - block_y) + nz * (at.z - block_z);
+            return (nx * (at.x - middle_x) + ny * (at.y - middle_y) + nz * (at.z - middle_z)) * per_step;
         };
         const Floats from = height(along(origin, direction, s)), to = height(there);
         const Mask below = hn::And(hn::Lt(from, low), hn::Lt(to, low)),

@@ -143,81 +143,77 @@ std::uint32_t packed(const RegionBox& box, const glm::ivec3& block, int octant) 
     return word;
 }
 
-/// What a slab says of a box of cells.
+/// A slab as its word keeps it.
 struct Slab {
-    std::array<int, 3> normal{0, 0, 0};
-    int low = -1, high = 1;
+    int normal_x = 0, normal_y = 0;
+    int begin = 0, thickness = kMostSlabSteps;
 
-    std::uint32_t first_word() const {
-        const auto byte = [](int value) { return static_cast<std::uint32_t>(value) & 0xffu; };
-        return byte(normal[0]) | byte(normal[1]) << 8 | byte(normal[2]) << 16;
+    std::uint32_t word() const {
+        return (static_cast<std::uint32_t>(normal_x) & 0xffu) |
+               (static_cast<std::uint32_t>(normal_y) & 0xffu) << 8 | static_cast<std::uint32_t>(begin) << 16 |
+               static_cast<std::uint32_t>(thickness) << 24;
     }
-    std::uint32_t second_word() const {
-        return (static_cast<std::uint32_t>(low) & 0xffffu) | static_cast<std::uint32_t>(high) << 16;
-    }
-    bool is_bound() const { return normal != std::array<int, 3>{0, 0, 0}; }
 };
 
 /// The slab of a brick's occupied cells within [first, end). With k f(p) = n . p + e(p), the surface f = 0
 /// lies where n . p = -e, and e, trilinear in each cell, is largest and smallest at its corners. The normal
-/// is the mean gradient; where none stands out, the slab is everything.
+/// is the mean gradient, up or down; where none stands out, the slab has no bound.
 Slab slab_of(const Brick& brick, const glm::ivec3& first, const glm::ivec3& end) {
-    glm::dvec3 gradient(0.0);
-    const auto for_each_occupied = [&](const auto& visit) {
+    const auto for_each_corner = [&](const auto& visit) {
         for (int x = first.x; x < end.x; ++x) {
             for (int y = first.y; y < end.y; ++y) {
                 for (int z = first.z; z < end.z; ++z) {
-                    if (brick.is_occupied(x, y, z)) visit(glm::ivec3(x, y, z));
+                    if (!brick.is_occupied(x, y, z)) continue;
+                    for (int corner = 0; corner < 8; ++corner) {
+                        const glm::ivec3 side(corner >> 2 & 1, corner >> 1 & 1, corner & 1);
+                        const glm::ivec3 at = glm::ivec3(x, y, z) + side;
+                        visit(at, side, static_cast<double>(brick.voxels(Brick::index(at.x, at.y, at.z))));
+                    }
                 }
             }
         }
     };
-    const auto corner_of = [](const glm::ivec3& cell, int corner) {
-        return cell + glm::ivec3(corner >> 2 & 1, corner >> 1 & 1, corner & 1);
-    };
-    const auto value_at = [&](const glm::ivec3& sample) {
-        return static_cast<double>(brick.voxels(Brick::index(sample.x, sample.y, sample.z)));
-    };
-    int count = 0;
-    for_each_occupied([&](const glm::ivec3& cell) {
-        for (int corner = 0; corner < 8; ++corner) {
-            const double value = value_at(corner_of(cell, corner));
-            for (int axis = 0; axis < 3; ++axis) {
-                gradient[axis] += corner >> (2 - axis) & 1 ? value : -value;
-            }
-        }
-        ++count;
-    });
-    constexpr double kNormalLength = 127.0, kLeastGradient = 0.05;
     // Each cell has four edges along an axis.
-    const double mean = glm::length(gradient) / (4.0 * std::max(count, 1));
-    Slab everywhere;
-    if (!(mean > kLeastGradient)) return everywhere;
+    glm::dvec3 gradient(0.0);
+    double corners = 0.0;
+    for_each_corner([&](const glm::ivec3&, const glm::ivec3& side, double value) {
+        gradient += 2.0 * value * (glm::dvec3(side) - 0.5);
+        corners += 1.0;
+    });
+    gradient /= std::max(0.5 * corners, 1.0);
+    const double length = std::abs(gradient.x) + std::abs(gradient.y) + std::abs(gradient.z);
+    constexpr double kLeastGradient = 0.05;
+    if (!(length > kLeastGradient)) return {};
+    // Steeper than 127 : 1 along x or y is as good as that.
+    const double k = (gradient.z < 0.0 ? -kSlabNormal : kSlabNormal) / length;
     Slab slab;
-    const double scale = kNormalLength / glm::length(gradient);
-    for (int axis = 0; axis < 3; ++axis) {
-        slab.normal[static_cast<std::size_t>(axis)] =
-            static_cast<int>(std::lround(std::clamp(scale * gradient[axis], -127.0, 127.0)));
-    }
-    const double k = kNormalLength / mean;
+    // Towards zero: z is not negative.
+    slab.normal_x = static_cast<int>(k * gradient.x);
+    slab.normal_y = static_cast<int>(k * gradient.y);
+    const glm::dvec3 normal(slab.normal_x, slab.normal_y,
+                            kSlabNormal - std::abs(slab.normal_x) - std::abs(slab.normal_y));
     double least = 1e30, most = -1e30;
-    for_each_occupied([&](const glm::ivec3& cell) {
-        for (int corner = 0; corner < 8; ++corner) {
-            const glm::ivec3 at = corner_of(cell, corner);
-            const double e =
-                k * value_at(at) - slab.normal[0] * at.x - slab.normal[1] * at.y - slab.normal[2] * at.z;
-            least = std::min(least, e);
-            most = std::max(most, e);
-        }
+    for_each_corner([&](const glm::ivec3& at, const glm::ivec3&, double value) {
+        const double e = k * value - glm::dot(normal, glm::dvec3(at) - 0.5 * kBrickCells);
+        least = std::min(least, e);
+        most = std::max(most, e);
     });
     // More than positions round within 4096 voxels.
-    constexpr double kMarginVoxels = 2e-3;
-    const double low = std::floor((-most - kNormalLength * kMarginVoxels) * static_cast<double>(kSlabSteps));
-    const double high = std::ceil((-least + kNormalLength * kMarginVoxels) * static_cast<double>(kSlabSteps));
-    if (low < -32767.0 || high > 32767.0) return everywhere;
-    slab.low = static_cast<int>(low);
-    slab.high = static_cast<int>(high);
+    constexpr double kMargin = 2e-3 * kSlabNormal;
+    const double begin = std::floor((-most - kMargin) / static_cast<double>(kSlabStep)),
+                 finish = std::ceil((-least + kMargin) / static_cast<double>(kSlabStep));
+    if (begin < -kSlabMiddle || begin >= kSlabMiddle || !(finish - begin < kMostSlabSteps)) return {};
+    slab.begin = static_cast<int>(begin) + kSlabMiddle;
+    slab.thickness = static_cast<int>(finish - begin);
     return slab;
+}
+
+/// A slab of the whole brick takes a ray further than its region's, if it is not much thicker.
+std::uint32_t wider(const Slab& of_region, const Slab& of_brick) {
+    constexpr int kThicker = 8;
+    const bool is_wide =
+        of_brick.thickness < kMostSlabSteps && of_brick.thickness <= of_region.thickness + kThicker;
+    return is_wide ? kWideSlab | of_brick.word() : of_region.word();
 }
 
 glm::ivec3 region_at(int number) {
@@ -227,9 +223,7 @@ glm::ivec3 region_at(int number) {
 }  // namespace
 
 SkipBoxes::SkipBoxes(const BrickGrid& grid)
-    : top(kOctants * grid.top().size()),
-      boxes(kBrickBoxes * grid.brick_count()),
-      slabs(kBrickSlabs * grid.brick_count()) {
+    : top(kOctants * grid.top().size()), boxes(kBrickBoxes * grid.brick_count()) {
     const OccupiedRegions occupied(grid);
     const glm::ivec3 blocks = grid.block_count();
     const std::size_t block_total = grid.top().size();
@@ -252,24 +246,23 @@ SkipBoxes::SkipBoxes(const BrickGrid& grid)
             for (int octant = 0; octant < kOctants; ++octant) {
                 top[static_cast<std::size_t>(octant) * block_total + number] = entry;
             }
+            const Slab of_brick = slab_of(brick, glm::ivec3(0), glm::ivec3(kBrickCells));
             for (int region = 0; region < kRegions; ++region) {
                 const glm::ivec3 at = region_at(region);
                 const RegionBox own{first + at, first + at + 1};
                 const bool is_occupied = occupied.any_in(own);
-                for (int octant = 0; octant < kOctants; ++octant) {
-                    std::uint32_t& word = boxes[number_of_brick * kBrickBoxes +
-                                                static_cast<std::size_t>(octant * kRegions + region)];
-                    word = is_occupied ? packed(own, block, octant)
-                                       : kEmptyBox | packed(grow(occupied, own, octant), block, octant);
+                std::uint32_t slab = 0;
+                if (is_occupied) {
+                    slab = wider(
+                        slab_of(brick, {region_begin(at.x), region_begin(at.y), region_begin(at.z)},
+                                {region_begin(at.x + 1), region_begin(at.y + 1), region_begin(at.z + 1)}),
+                        of_brick);
                 }
-                if (!is_occupied) continue;
-                const Slab slab =
-                    slab_of(brick, {region_begin(at.x), region_begin(at.y), region_begin(at.z)},
-                            {region_begin(at.x + 1), region_begin(at.y + 1), region_begin(at.z + 1)});
-                std::uint32_t* words =
-                    &slabs[number_of_brick * kBrickSlabs + static_cast<std::size_t>(2 * region)];
-                words[0] = slab.first_word();
-                words[1] = slab.second_word();
+                for (int octant = 0; octant < kOctants; ++octant) {
+                    boxes[number_of_brick * kBrickBoxes +
+                          static_cast<std::size_t>(octant * kRegions + region)] =
+                        is_occupied ? slab : kEmptyBox | packed(grow(occupied, own, octant), block, octant);
+                }
             }
         }
     });

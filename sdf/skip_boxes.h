@@ -22,18 +22,23 @@ inline constexpr int kOctants = 8;
 inline constexpr int kBrickRegions = 3;
 inline constexpr int kRegions = kBrickRegions * kBrickRegions * kBrickRegions;
 
-/// Words a brick in SkipBoxes::boxes and SkipBoxes::slabs.
+/// Words a brick in SkipBoxes::boxes.
 inline constexpr int kBrickBoxes = kOctants * kRegions;
-inline constexpr int kBrickSlabs = 2 * kRegions;
 
-/// Slabs lie between values of (normal . position) in steps of 1 / kSlabSteps; normals are 127 long.
-inline constexpr float kSlabSteps = 16.0f;
-
-/// A box is one word: kEmptyBox where it holds no occupied cell, and along x, y and z the cells from its
-/// block's near side (as the ray comes) to the box's far side, ten bits each, x highest.
+/// A box that holds no occupied cell is kEmptyBox and, along x, y and z, the cells from its block's near side
+/// (as the ray comes) to the box's far side, ten bits each, x highest.
 inline constexpr std::uint32_t kEmptyBox = 0x80000000u;
 inline constexpr int kBoxBits = 10;
 inline constexpr int kMostBoxCells = (1 << kBoxBits) - 1;
+
+/// Any other word is a slab: of the whole brick where kWideSlab is set, else of the region. From the lowest
+/// bits: x and y of the normal, eight bits each, signed; z is what is left to kSlabNormal, never negative.
+/// Heights are normal . (position - middle of the brick) in steps of kSlabStep: where the slab begins, plus
+/// 128, eight bits; how thick it is, six bits, the most for one without a bound.
+inline constexpr std::uint32_t kWideSlab = 0x40000000u;
+inline constexpr int kSlabNormal = 127;
+inline constexpr float kSlabStep = 7.0f * 127.0f / 256.0f;
+inline constexpr int kSlabMiddle = 128, kMostSlabSteps = 63;
 
 /// The boxes and slabs of one field.
 struct SkipBoxes {
@@ -42,9 +47,6 @@ struct SkipBoxes {
     std::vector<std::int32_t> top;
     /// By brick, octant, region (x slowest).
     std::vector<std::uint32_t> boxes;
-    /// By brick and region, two words: the normal's components in the three lowest bytes, signed; the slab's
-    /// lower and upper end in the halves, signed. Of positions from the brick's lowest corner, voxels.
-    std::vector<std::uint32_t> slabs;
 
     explicit SkipBoxes(const BrickGrid& grid);
 };

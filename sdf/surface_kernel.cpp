@@ -75,79 +75,90 @@ HWY_INLINE HWY_ATTR ClosestLanes closest_on_triangles(const Vector& p, const Vec
     return best;
 }
 
-/// Samples from a cell's first to its corner 4 x + 2 y + z.
-constexpr int kCornerSample[] = {0, 1, 8, 9, 64, 65, 72, 73};
+constexpr int kCellWords = sizeof(CellSurface) / sizeof(std::int32_t);
+constexpr int kTriangleWords = sizeof(VoxelTriangle) / sizeof(float);
 
-HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
-    const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f);
-    const Ints none = hn::Set(kInt, -1), no_entry = hn::Set(kInt, 0xffff);
-    const auto* entries = reinterpret_cast<const std::int32_t*>(table.palette_entries);
-    const auto* triangles = reinterpret_cast<const float*>(table.triangles);
+HWY_INLINE HWY_ATTR void find_gradients(const SurfaceTable& table, SurfacePoints& points) {
+    const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f), unit = hn::Set(kFloat, kGradientStep);
+    const auto* words = reinterpret_cast<const std::int32_t*>(table.cells);
     for (std::size_t i = 0; i < points.size(); i += hn::Lanes(kFloat)) {
-        const Vector p{hn::Load(kFloat, &points.x[i]), hn::Load(kFloat, &points.y[i]),
-                       hn::Load(kFloat, &points.z[i])};
-        const Ints brick = hn::Load(kInt, &points.brick[i]);
-        const Ints first = hn::ShiftLeft<9>(brick) + hn::Load(kInt, &points.first_sample[i]);
-        const Floats fx = unit_clamped(p.x - hn::Load(kFloat, &points.cell_x[i])),
-                     fy = unit_clamped(p.y - hn::Load(kFloat, &points.cell_y[i])),
-                     fz = unit_clamped(p.z - hn::Load(kFloat, &points.cell_z[i]));
+        const Ints first = hn::Load(kInt, &points.cell[i]) * hn::Set(kInt, kCellWords);
+        const auto in_cell = [i](const core::Column<float>& at, const core::Column<float>& low) HWY_ATTR {
+            return unit_clamped(hn::Load(kFloat, &at[i]) - hn::Load(kFloat, &low[i]));
+        };
+        const Floats fx = in_cell(points.x, points.cell_x), fy = in_cell(points.y, points.cell_y),
+                     fz = in_cell(points.z, points.cell_z);
         const Floats gx = one - fx, gy = one - fy, gz = one - fz;
-        const Ints palette_first = hn::GatherIndex(kInt, table.palette_first, brick);
-
         Vector gradient{zero, zero, zero};
-        Ints entries_of[8];  // Of the corners.
         for (int corner = 0; corner < 8; ++corner) {
-            const Ints sample = first + hn::Set(kInt, kCornerSample[corner]);
             const Floats weight = (corner & 4 ? fx : gx) * (corner & 2 ? fy : gy) * (corner & 1 ? fz : gz);
-            const Ints packed = hn::GatherIndex(kInt, table.gradients, sample);
+            const Ints packed = hn::GatherIndex(kInt, words + corner, first);
             gradient.x = gradient.x + weight * hn::ConvertTo(kFloat, hn::ShiftRight<22>(packed));
             gradient.y =
                 gradient.y + weight * hn::ConvertTo(kFloat, hn::ShiftRight<22>(hn::ShiftLeft<10>(packed)));
             gradient.z =
                 gradient.z + weight * hn::ConvertTo(kFloat, hn::ShiftRight<22>(hn::ShiftLeft<20>(packed)));
-            if (corner & 1) continue;
-            // Two entries along z in a word.
-            const Ints pair = hn::GatherOffset(kInt, entries, hn::ShiftLeft<1>(sample));
-            entries_of[corner] = hn::And(pair, no_entry);
-            entries_of[corner + 1] = hn::And(hn::ShiftRight<16>(pair), no_entry);
         }
-
-        // Every distinct triangle once, in ascending order: of equally close ones the first stays.
-        Floats best_u = zero, best_v = zero, best_squared = hn::Set(kFloat, 1e30f);
-        Ints best_triangle = none, entry = none;
-        for (;;) {
-            Ints next = no_entry;
-            for (const Ints other : entries_of) {
-                next = hn::IfThenElse(hn::And(hn::Gt(other, entry), hn::Lt(other, next)), other, next);
-            }
-            entry = next;
-            const auto named = hn::Lt(entry, no_entry);
-            if (hn::AllFalse(kInt, named)) break;
-            const Ints triangle =
-                hn::GatherIndex(kInt, table.palettes, hn::IfThenElseZero(named, palette_first + entry));
-            // Nine floats a triangle.
-            const Ints record = hn::ShiftLeft<3>(triangle) + triangle;
-            const auto component = [&](int number) HWY_ATTR {
-                return hn::GatherIndex(kFloat, triangles, record + hn::Set(kInt, number));
-            };
-            const Vector from{p.x - component(0), p.y - component(1), p.z - component(2)};
-            const ClosestLanes found = closest_on_triangles(from, {component(3), component(4), component(5)},
-                                                            {component(6), component(7), component(8)});
-            const auto nearer = hn::And(named, hn::RebindMask(kInt, hn::Lt(found.squared, best_squared)));
-            const auto nearer_float = hn::RebindMask(kFloat, nearer);
-            best_triangle = hn::IfThenElse(nearer, triangle, best_triangle);
-            best_u = hn::IfThenElse(nearer_float, found.u, best_u);
-            best_v = hn::IfThenElse(nearer_float, found.v, best_v);
-            best_squared = hn::IfThenElse(nearer_float, found.squared, best_squared);
-        }
-        const Floats unit = hn::Set(kFloat, kGradientStep);
         hn::Store(gradient.x * unit, kFloat, &points.gradient_x[i]);
         hn::Store(gradient.y * unit, kFloat, &points.gradient_y[i]);
         hn::Store(gradient.z * unit, kFloat, &points.gradient_z[i]);
-        hn::Store(best_triangle, kInt, &points.triangle[i]);
-        hn::Store(best_u, kFloat, &points.u[i]);
-        hn::Store(best_v, kFloat, &points.v[i]);
-        hn::Store(best_squared, kFloat, &points.distance_squared[i]);
+    }
+}
+
+/// The closest point of each pair's triangle.
+HWY_INLINE HWY_ATTR void measure_pairs(const SurfaceTable& table, SurfacePoints& points, std::size_t count) {
+    const auto* triangles = reinterpret_cast<const float*>(table.triangles);
+    SurfacePoints::Pairs& pairs = points.pairs;
+    for (std::size_t i = 0; i < count; i += hn::Lanes(kFloat)) {
+        const Ints point = hn::Load(kInt, &pairs.point[i]);
+        const Ints record = hn::Load(kInt, &pairs.triangle[i]) * hn::Set(kInt, kTriangleWords);
+        const auto component = [&](int number)
+                                   HWY_ATTR { return hn::GatherIndex(kFloat, triangles + number, record); };
+        const Vector from{hn::GatherIndex(kFloat, points.x.data(), point) - component(0),
+                          hn::GatherIndex(kFloat, points.y.data(), point) - component(1),
+                          hn::GatherIndex(kFloat, points.z.data(), point) - component(2)};
+        const ClosestLanes found = closest_on_triangles(from, {component(3), component(4), component(5)},
+                                                        {component(6), component(7), component(8)});
+        hn::Store(found.u, kFloat, &pairs.u[i]);
+        hn::Store(found.v, kFloat, &pairs.v[i]);
+        hn::Store(found.squared, kFloat, &pairs.distance_squared[i]);
+    }
+}
+
+HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
+    // Every triangle that a crossing's cell names makes a pair, so that no lane waits for another's cell. By
+    // the time they are measured, the triangles are in the cache.
+    SurfacePoints::Pairs& pairs = points.pairs;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        for (const std::int32_t triangle : table.cells[points.cell[i]].triangle) {
+            if (triangle < 0) break;
+            pairs.point[count] = static_cast<std::int32_t>(i);
+            pairs.triangle[count] = triangle;
+            ++count;
+            const VoxelTriangle* record = &table.triangles[triangle];
+            __builtin_prefetch(record);
+            __builtin_prefetch(reinterpret_cast<const char*>(record + 1) - 1);
+        }
+    }
+    for (std::size_t i = count; i % hn::Lanes(kFloat) != 0; ++i) {
+        pairs.point[i] = 0;
+        pairs.triangle[i] = 0;
+    }
+    find_gradients(table, points);
+    measure_pairs(table, points, count);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        points.triangle[i] = -1;
+        points.distance_squared[i] = 1e30f;
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+        // Ascending: of equally close ones the first stays.
+        const auto i = static_cast<std::size_t>(pairs.point[k]);
+        if (!(pairs.distance_squared[k] < points.distance_squared[i])) continue;
+        points.distance_squared[i] = pairs.distance_squared[k];
+        points.triangle[i] = pairs.triangle[k];
+        points.u[i] = pairs.u[k];
+        points.v[i] = pairs.v[k];
     }
 }
 
@@ -178,31 +189,41 @@ std::int32_t stored_gradient(const glm::dvec3& gradient) {
                                      component(gradient.z) << 2);
 }
 
-void SurfacePoints::set(std::size_t index, const MarchRay& ray, const MarchHit& hit) {
+std::int32_t surface_cell(const SurfaceTable& table, const MarchHit& hit) {
+    const BrickCells& cells = table.bricks[hit.brick];
+    const int x = hit.cell[0] % kBrickCells, y = hit.cell[1] % kBrickCells, z = hit.cell[2] % kBrickCells;
+    // A crossing in the very face of a cell may be seen from the empty one beyond it: all that lie below or
+    // at it have been counted, and one of them is next to it.
+    const int last =
+        std::max(cells.before[kBrickCells - 1] + std::popcount(cells.occupied[kBrickCells - 1]) - 1, 0);
+    return cells.first + std::min(cells.rank(x, y, z), last);
+}
+
+void SurfacePoints::set(const SurfaceTable& table, std::size_t index, const MarchRay& ray,
+                        const MarchHit& hit) {
     x[index] = ray.origin[0] + hit.distance * ray.direction[0];
     y[index] = ray.origin[1] + hit.distance * ray.direction[1];
     z[index] = ray.origin[2] + hit.distance * ray.direction[2];
     cell_x[index] = hit.cell[0];
     cell_y[index] = hit.cell[1];
     cell_z[index] = hit.cell[2];
-    brick[index] = hit.brick;
-    first_sample[index] =
-        Brick::index(hit.cell[0] % kBrickCells, hit.cell[1] % kBrickCells, hit.cell[2] % kBrickCells);
+    cell[index] = surface_cell(table, hit);
+    __builtin_prefetch(&table.cells[cell[index]]);
 }
 
 void SurfacePoints::resize(std::size_t count) {
     size_ = count;
     const std::size_t padded = core::padded_stream_size(count);
-    for (auto* column : {&x, &y, &z, &cell_x, &cell_y, &cell_z, &gradient_x, &gradient_y, &gradient_z, &u, &v,
-                         &distance_squared}) {
-        if (column->size() < padded) column->resize(padded);
-    }
-    for (auto* column : {&brick, &first_sample, &triangle}) {
-        if (column->size() < padded) column->resize(padded);
-    }
+    const auto widen = [](std::size_t size, auto&... columns) {
+        ((columns.size() < size ? columns.resize(size) : void()), ...);
+    };
+    widen(padded, x, y, z, cell_x, cell_y, cell_z, cell, gradient_x, gradient_y, gradient_z, triangle, u, v,
+          distance_squared);
+    const std::size_t most_pairs = core::padded_stream_size(8 * count);
+    widen(most_pairs, pairs.point, pairs.triangle, pairs.u, pairs.v, pairs.distance_squared);
     for (std::size_t i = count; i < padded; ++i) {
         x[i] = y[i] = z[i] = cell_x[i] = cell_y[i] = cell_z[i] = 0.0f;
-        brick[i] = first_sample[i] = 0;
+        cell[i] = 0;
     }
 }
 

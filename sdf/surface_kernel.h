@@ -2,6 +2,8 @@
 // for many crossings at once.
 #pragma once
 
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -26,12 +28,30 @@ struct VoxelTriangle {
 inline constexpr float kGradientStep = 1.0f / 400.0f;
 std::int32_t stored_gradient(const glm::dvec3& gradient);
 
-/// What the samples of all fields know besides their distance; one entry a sample, as in Brick.
+/// What an occupied cell knows besides its samples.
+struct alignas(64) CellSurface {
+    std::int32_t gradient[8];  ///< At the corners, corner 4 x + 2 y + z.
+    std::int32_t triangle[8];  ///< The distinct ones that the corners name, ascending; the rest -1.
+};
+
+/// The occupied cells of a brick.
+struct BrickCells {
+    std::array<std::uint64_t, kBrickCells> occupied{};  ///< As in Brick.
+    std::array<std::uint16_t, kBrickCells> before{};    ///< Occupied cells in the layers below.
+    std::int32_t first = 0;                             ///< Of its cells in SurfaceTable::cells.
+
+    /// Which of the brick's cells, in the order of `occupied`, a cell is. @pre it is occupied
+    int rank(int x, int y, int z) const {
+        const auto layer = static_cast<std::size_t>(x);
+        const std::uint64_t below = (std::uint64_t{1} << (kBrickCells * y + z)) - 1;
+        return before[layer] + std::popcount(occupied[layer] & below);
+    }
+};
+
+/// The surface of all fields; bricks and triangles are numbered over all of them.
 struct SurfaceTable {
-    const std::int32_t* gradients = nullptr;
-    const std::uint16_t* palette_entries = nullptr;  ///< One more entry than there are samples.
-    const std::int32_t* palette_first = nullptr;     ///< By brick.
-    const std::int32_t* palettes = nullptr;          ///< Triangles, numbered over all fields.
+    const BrickCells* bricks = nullptr;
+    const CellSurface* cells = nullptr;
     const VoxelTriangle* triangles = nullptr;
 };
 
@@ -39,9 +59,8 @@ struct SurfaceTable {
 struct SurfacePoints {
     // In.
     core::Column<float> x, y, z;                 ///< Voxel coordinates.
-    core::Column<std::int32_t> brick;            ///< Over all fields.
     core::Column<float> cell_x, cell_y, cell_z;  ///< The cell's lowest corner, voxel coordinates.
-    core::Column<std::int32_t> first_sample;     ///< Of the cell, within its brick.
+    core::Column<std::int32_t> cell;             ///< Its entry in SurfaceTable::cells.
     // Out.
     core::Column<float> gradient_x, gradient_y, gradient_z;  ///< Of the field, in voxels.
     core::Column<std::int32_t>
@@ -50,10 +69,17 @@ struct SurfacePoints {
     core::Column<float> distance_squared;  ///< From that point, voxels.
 
     std::size_t size() const { return size_; }
-    /// Padding is filled with crossings of the first brick.
+    /// Padding is filled with crossings of the first cell.
     void resize(std::size_t count);
     /// Sets a crossing that march_rays() found.
-    void set(std::size_t index, const MarchRay& ray, const MarchHit& hit);
+    void set(const SurfaceTable& table, std::size_t index, const MarchRay& ray, const MarchHit& hit);
+
+    /// A crossing and a triangle that may be the closest, for find_surface().
+    struct Pairs {
+        core::Column<std::int32_t> point, triangle;
+        core::Column<float> u, v, distance_squared;
+    };
+    Pairs pairs;
 
 private:
     std::size_t size_ = 0;
@@ -62,5 +88,8 @@ private:
 /// Fills the columns marked Out. The gradient is the trilinear mean of the corners' gradients; among equally
 /// close triangles the lowest number wins. Same bits on every instruction set.
 void find_surface(const SurfaceTable& table, SurfacePoints& points);
+
+/// @returns the entry of a crossing's cell in SurfaceTable::cells
+std::int32_t surface_cell(const SurfaceTable& table, const MarchHit& hit);
 
 }  // namespace sdf

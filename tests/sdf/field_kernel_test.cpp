@@ -174,7 +174,7 @@ TEST_F(FieldKernel, SurfacePointsAreTheClosestTrianglesAndTheMeanGradient) {
         const TargetInUse in_use(target);
         sdf::SurfacePoints points;
         points.resize(met.size());
-        for (std::size_t k = 0; k < met.size(); ++k) points.set(k, rays[met[k]], hits[met[k]]);
+        for (std::size_t k = 0; k < met.size(); ++k) points.set(atlas_.surface_table(), k, rays[met[k]], hits[met[k]]);
         sdf::find_surface(atlas_.surface_table(), points);
         for (std::size_t k = 0; k < met.size(); ++k) {
             const sdf::MarchHit& hit = hits[met[k]];

@@ -39,6 +39,7 @@ protected:
     sdf::CellBox cells_of(std::uint32_t word, int octant, const glm::ivec3& cell) const {
         const glm::ivec3 first = cell / sdf::kBrickCells * sdf::kBrickCells;
         sdf::CellBox cells{cell, cell + 1};
+        if (!(word & sdf::kEmptyBox)) return cells;
         for (int axis = 0; axis < 3; ++axis) {
             const auto extent = static_cast<int>(word >> ((2 - axis) * sdf::kBoxBits) & sdf::kMostBoxCells);
             if (octant >> (2 - axis) & 1) {
@@ -122,7 +123,7 @@ TEST_F(SkipBoxes, BoxesCannotGrowAlongAnyAxis) {
 
 TEST_F(SkipBoxes, SlabsHoldTheSurfaceOfTheirRegions) {
     TestRandom random(3);
-    std::size_t crossings = 0;
+    std::size_t crossings = 0, regions = 0, unbound = 0, wide = 0;
     double thickness = 0.0;
     for (std::size_t number = 0; number < grid_->brick_count(); ++number) {
         const sdf::Brick& brick = grid_->brick_at(static_cast<std::int32_t>(number));
@@ -130,14 +131,20 @@ TEST_F(SkipBoxes, SlabsHoldTheSurfaceOfTheirRegions) {
             const glm::ivec3 at(cell / 49, cell / 7 % 7, cell % 7);
             if (!brick.is_occupied(at.x, at.y, at.z)) continue;
             const int region = region_number(region_of(at));
-            const std::uint32_t* words = &skip_.slabs[number * sdf::kBrickSlabs + std::size_t(2 * region)];
-            glm::dvec3 normal;
-            for (int axis = 0; axis < 3; ++axis) {
-                normal[axis] = static_cast<std::int8_t>(words[0] >> (8 * axis) & 0xff);
-            }
-            const double steps = static_cast<double>(sdf::kSlabSteps);
-            const double low = static_cast<std::int16_t>(words[1] & 0xffff) / steps,
-                         high = static_cast<std::int16_t>(words[1] >> 16) / steps;
+            const std::uint32_t word = skip_.boxes[number * sdf::kBrickBoxes + std::size_t(region)];
+            ASSERT_FALSE(word & sdf::kEmptyBox);
+            const int x = static_cast<std::int8_t>(word & 0xff),
+                      y = static_cast<std::int8_t>(word >> 8 & 0xff);
+            const glm::dvec3 normal(x, y, sdf::kSlabNormal - std::abs(x) - std::abs(y));
+            ASSERT_GE(normal.z, 0.0);
+            const int begin = static_cast<int>(word >> 16 & 0xff) - sdf::kSlabMiddle,
+                      steps = static_cast<int>(word >> 24 & sdf::kMostSlabSteps);
+            ++regions;
+            unbound += steps == sdf::kMostSlabSteps;
+            wide += (word & sdf::kWideSlab) != 0;
+            if (steps == sdf::kMostSlabSteps) continue;
+            const double low = begin * static_cast<double>(sdf::kSlabStep),
+                         high = (begin + steps) * static_cast<double>(sdf::kSlabStep);
             const sdf::CellCorners corners = sdf::CellCorners::load(brick, at);
             for (int i = 0; i < 20; ++i) {
                 const glm::dvec3 a(random.uniform(), random.uniform(), random.uniform()),
@@ -150,15 +157,17 @@ TEST_F(SkipBoxes, SlabsHoldTheSurfaceOfTheirRegions) {
                     const glm::dvec3 middle = 0.5 * (p + q);
                     ((corners.at(middle) < 0.0) == (fa < 0.0) ? p : q) = middle;
                 }
-                const double height = glm::dot(normal, glm::dvec3(at) + p);
+                const double height = glm::dot(normal, glm::dvec3(at) + p - 3.5);
                 ASSERT_GE(height, low) << "brick " << number;
                 ASSERT_LE(height, high) << "brick " << number;
                 ++crossings;
-                thickness += (high - low) / std::max(glm::length(normal), 1.0);
+                thickness += (high - low) / glm::length(normal);
             }
         }
     }
     ASSERT_GT(crossings, 50'000u);
+    EXPECT_LT(unbound, regions / 4);
+    EXPECT_GT(wide, regions / 10);
     // A tight bound, and not one of everything.
     EXPECT_LT(thickness / static_cast<double>(crossings), 0.6);
 }
