@@ -100,7 +100,9 @@ Camera framing(const DoubleBounds& bounds, double aspect) {
             kMargin * std::max(std::abs(local.x) / (half_height * aspect), std::abs(local.y) / half_height);
         distance = std::max(distance, local.z + needed);
     }
-    Camera camera = look_at(center + distance * towards_eye, center, up, kVerticalFov);
+    // Only moved: beside a box far from the origin the way to it may round to nothing.
+    Camera camera = oriented;
+    camera.world_from_camera[3] = glm::dvec4(center + distance * towards_eye, 1.0);
     camera.name = "framing";
     return camera;
 }

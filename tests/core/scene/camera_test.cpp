@@ -122,7 +122,8 @@ TEST(Camera, FramingSeesEveryCornerOfTheBox) {
 }
 
 TEST(Camera, FramingOfNothingOrAPointIsStillACamera) {
-    for (const core::DoubleBounds& box : {core::DoubleBounds{}, core::DoubleBounds{{3, 3, 3}, {3, 3, 3}}}) {
+    for (const core::DoubleBounds& box : {core::DoubleBounds{}, core::DoubleBounds{{3, 3, 3}, {3, 3, 3}},
+                                          core::DoubleBounds{{1e20, 1e20, 1e20}, {1e20, 1e20, 1e20}}}) {
         const core::Ray ray = core::CameraRays(core::framing(box, 1.0), 8, 8).ray({4, 4});
         EXPECT_NEAR(glm::length(ray.direction), 1.0f, kFloatRounding);
         EXPECT_TRUE(std::isfinite(ray.origin.x + ray.origin.y + ray.origin.z));
