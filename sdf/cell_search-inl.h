@@ -50,6 +50,7 @@ struct Candidates {
         const std::int16_t* corner = fields.samples +
                                      static_cast<std::ptrdiff_t>(p.brick[lane]) * kBrickSize +
                                      static_cast<int>(sample);
+        __builtin_prefetch(&fields.bricks[p.brick[lane]]);
         __builtin_prefetch(corner);
         __builtin_prefetch(corner + kSampleBytesX / 2);
     }
@@ -247,10 +248,17 @@ HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, 
                 MarchHit& hit = hits[number];
                 hit.distance = hit_at[lane];
                 hit.brick = candidates.brick[i];
+                hit.surface = 0;
                 for (int axis = 0; axis < 3; ++axis) {
                     hit.cell[axis] = static_cast<std::int16_t>(cell_at[axis][lane]);
                 }
                 hit.status = found_bits >> lane & 1 ? MarchStatus::kHit : MarchStatus::kMiss;
+                if (hit.status == MarchStatus::kHit) {
+                    hit.surface = fields.bricks[hit.brick].entry(
+                        hit.cell[0] % kBrickCells,
+                        hit.cell[1] % kBrickCells * kBrickCells + hit.cell[2] % kBrickCells);
+                    __builtin_prefetch(&fields.cells[hit.surface]);
+                }
                 hit.enters_negative = candidates.sign[i] > 0.0f;
                 hit.steps = static_cast<std::uint32_t>(candidates.steps[i]);
             }

@@ -20,7 +20,7 @@ namespace HWY_NAMESPACE {
 /// What a ray is that met nothing.
 HWY_INLINE HWY_ATTR void store_end(const Packet& p, std::size_t lane, MarchStatus status, MarchHit& hit) {
     hit.distance = 0.0f;
-    hit.brick = 0;
+    hit.brick = hit.surface = 0;
     hit.cell[0] = hit.cell[1] = hit.cell[2] = 0;
     hit.status = status;
     hit.enters_negative = false;

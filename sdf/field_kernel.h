@@ -9,6 +9,9 @@
 // change of sign however the positions round: cells, bricks and blocks meet without gaps.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -32,12 +35,37 @@ inline constexpr float kHitEpsVoxels = 0.1f;
 
 inline constexpr int kBrickBits = 21;
 
+/// What an occupied cell knows besides its samples.
+struct alignas(64) CellSurface {
+    std::int32_t gradient[8];  ///< At the corners, corner 4 x + 2 y + z; see stored_gradient().
+    std::int32_t triangle[8];  ///< The distinct ones that the corners name, ascending; the rest -1.
+};
+
+/// The occupied cells of a brick.
+struct alignas(16) BrickCells {
+    std::array<std::uint64_t, kBrickCells> occupied{};  ///< As in Brick.
+    std::array<std::uint16_t, kBrickCells> before{};    ///< Occupied cells in the layers below.
+    std::int32_t first = 0;  ///< Of its cells among the CellSurfaces of all fields.
+
+    int count() const { return before.back() + std::popcount(occupied.back()); }
+    /// The CellSurface of a cell, counted over all fields. A crossing in the very face of a cell may be seen
+    /// from the empty one beyond it: that has the next cell's. @param y_z 7 y + z
+    std::int32_t entry(int x, int y_z) const {
+        const auto layer = static_cast<std::size_t>(x);
+        const std::uint64_t below = (std::uint64_t{1} << y_z) - 1;
+        const int rank = before[layer] + std::popcount(occupied[layer] & below);
+        return first + std::min(rank, count() - 1);
+    }
+};
+
 /// Fields of many meshes laid out for the kernel: blocks of 7^3 cells, those near the surface with a brick of
 /// 8^3 samples (see brick_grid.h), and how far rays may skip (see skip_boxes.h).
 struct FieldTable {
     /// Entries of all fields, each by octant and block, as SkipBoxes::top; bricks numbered over all fields.
     const std::int32_t* top = nullptr;
-    const std::uint32_t* boxes = nullptr;   ///< As SkipBoxes::boxes.
+    const std::uint32_t* boxes = nullptr;  ///< As SkipBoxes::boxes.
+    const BrickCells* bricks = nullptr;    ///< What surface of each brick is stored where.
+    const CellSurface* cells = nullptr;
     const std::int16_t* samples = nullptr;  ///< kBrickSize a brick, as in Brick, and one more in all.
 };
 
@@ -58,6 +86,7 @@ enum class MarchStatus : std::uint8_t { kMiss, kHit, kExhausted };
 struct MarchHit {
     float distance;        ///< Voxels from the origin.
     std::int32_t brick;    ///< Over all fields.
+    std::int32_t surface;  ///< The cell's entry in FieldTable::cells.
     std::int16_t cell[3];  ///< Within the field.
     MarchStatus status;
     bool enters_negative;  ///< From positive to negative values.

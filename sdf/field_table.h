@@ -39,8 +39,10 @@ public:
     FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids, std::span<const core::Mesh> meshes);
 
     const Place& place(std::size_t grid) const { return places_[grid]; }
-    FieldTable table() const { return {top_.data(), boxes_.data(), samples_.data()}; }
-    SurfaceTable surface_table() const { return {bricks_.data(), cells_.data(), triangles_.data()}; }
+    FieldTable table() const {
+        return {top_.data(), boxes_.data(), bricks_.data(), cells_.data(), samples_.data()};
+    }
+    SurfaceTable surface_table() const { return {cells_.data(), triangles_.data()}; }
     /// By its number over all fields.
     const VoxelTriangle& triangle(std::int32_t number) const {
         return triangles_[static_cast<std::size_t>(number)];

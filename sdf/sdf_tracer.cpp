@@ -167,12 +167,11 @@ void SdfTracer::march_active(bool any, Work& work) const {
         }
     }
     if (work.met.empty()) return;
-    const SurfaceTable surface = atlas_.surface_table();
     work.surface.resize(work.met.size());
     for (std::size_t i = 0; i < work.met.size(); ++i) {
-        work.surface.set(surface, i, work.march_rays[work.met[i]], work.march_hits[work.met[i]]);
+        work.surface.set(i, work.march_rays[work.met[i]], work.march_hits[work.met[i]]);
     }
-    find_surface(surface, work.surface);
+    find_surface(atlas_.surface_table(), work.surface);
     for (std::size_t i = 0; i < work.met.size(); ++i) {
         finish_crossing(work, i, work.traced[work.active[work.met[i]]]);
     }

@@ -94,7 +94,7 @@ bool SdfTracer::accept(LocalRay& ray, const Crossing& crossing, const Surface& h
     found.instance = ray.instance;
     found.triangle = here.triangle;
     found.barycentrics = here.barycentrics;
-    found.is_front = glm::dot(glm::vec3(ray.direction), here.scaled_normal) < 0.0f;
+    found.is_front = here.is_front;
     found.gradient = here.gradient;
     found.enters_negative = crossing.enters_negative;
     found.is_triangle = false;
@@ -112,7 +112,7 @@ SdfTracer::Surface SdfTracer::surface_at(const LocalRay& ray, const Crossing& cr
     here.triangle = hit.index;
     here.distance = hit.distance / grid.voxel_size();
     here.barycentrics = glm::vec2(hit.point.barycentrics);
-    here.scaled_normal = glm::vec3(hit.corners.scaled_normal() / (grid.voxel_size() * grid.voxel_size()));
+    here.is_front = glm::dot(ray.direction, hit.corners.scaled_normal()) < 0.0;
     here.gradient = glm::vec3(smooth_gradient(grid, crossing.cell, crossing.point));
     return here;
 }
@@ -125,7 +125,7 @@ SdfTracer::Surface SdfTracer::surface_found(const Work& work, std::size_t at,
     here.triangle = static_cast<std::uint32_t>(surface.triangle[at] - triangle_base);
     here.distance = std::sqrt(surface.distance_squared[at]);
     here.barycentrics = {surface.u[at], surface.v[at]};
-    here.scaled_normal = atlas_.triangle(surface.triangle[at]).scaled_normal();
+    here.is_front = surface.is_front[at] != 0;
     here.gradient = {surface.gradient_x[at], surface.gradient_y[at], surface.gradient_z[at]};
     return here;
 }
@@ -168,13 +168,11 @@ void SdfTracer::finish_crossing(const Work& work, std::size_t at, Traced& traced
     Nearest found;
     if (placed.is_opaque && here.triangle != kNoTriangle && here.distance <= kFarthestTriangleVoxels) {
         // What accept() would say, without a ray in double.
-        const float* direction = work.march_rays[entry].direction;
         found.t = crossing.t;
         found.instance = passage.instance;
         found.triangle = here.triangle;
         found.barycentrics = here.barycentrics;
-        found.is_front =
-            glm::dot(glm::vec3(direction[0], direction[1], direction[2]), here.scaled_normal) < 0.0f;
+        found.is_front = here.is_front;
         found.gradient = here.gradient;
         found.enters_negative = crossing.enters_negative;
     } else {

@@ -98,8 +98,8 @@ struct SdfTracer::Surface {
     std::uint32_t triangle = kNoTriangle;
     double distance = 0.0;  ///< From the crossing, voxels.
     glm::vec2 barycentrics{0.0f};
-    glm::vec3 scaled_normal{0.0f};  ///< Of the triangle; voxels.
-    glm::vec3 gradient{0.0f};       ///< Of the field.
+    bool is_front = true;      ///< Whether the ray comes from its front.
+    glm::vec3 gradient{0.0f};  ///< Of the field.
 };
 
 }  // namespace sdf

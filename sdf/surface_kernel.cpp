@@ -105,61 +105,112 @@ HWY_INLINE HWY_ATTR void find_gradients(const SurfaceTable& table, SurfacePoints
     }
 }
 
-/// The closest point of each pair's triangle.
-HWY_INLINE HWY_ATTR void measure_pairs(const SurfaceTable& table, SurfacePoints& points, std::size_t count) {
-    const auto* triangles = reinterpret_cast<const float*>(table.triangles);
-    SurfacePoints::Pairs& pairs = points.pairs;
+/// Corners and sides of triangles, voxels.
+struct TriangleLanes {
+    Vector a, ab, ac;
+
+    HWY_ATTR TriangleLanes(const SurfaceTable& table, Ints numbers) {
+        const auto* words = reinterpret_cast<const float*>(table.triangles);
+        const Ints first = numbers * hn::Set(kInt, kTriangleWords);
+        const auto vector = [&](int number) HWY_ATTR {
+            return Vector{hn::GatherIndex(kFloat, words + number, first),
+                          hn::GatherIndex(kFloat, words + number + 1, first),
+                          hn::GatherIndex(kFloat, words + number + 2, first)};
+        };
+        a = vector(0);
+        ab = vector(3);
+        ac = vector(6);
+    }
+};
+
+/// Measures the triangles of the given place in the cells' lists, and keeps those that are nearer than the
+/// ones before: of equally close ones the first stays. @param open crossings whose lists are so long; returns
+/// with those that are longer
+template <bool kFirst>
+HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, SurfacePoints& points, int place,
+                                                  std::int32_t* open, std::size_t count) {
+    const Ints none = hn::Set(kInt, -1), zero = hn::Zero(kInt);
+    const auto* lists = reinterpret_cast<const std::int32_t*>(table.cells) + 8 + place;
+    std::size_t longer = 0;
     for (std::size_t i = 0; i < count; i += hn::Lanes(kFloat)) {
-        const Ints point = hn::Load(kInt, &pairs.point[i]);
-        const Ints record = hn::Load(kInt, &pairs.triangle[i]) * hn::Set(kInt, kTriangleWords);
-        const auto component = [&](int number)
-                                   HWY_ATTR { return hn::GatherIndex(kFloat, triangles + number, record); };
-        const Vector from{hn::GatherIndex(kFloat, points.x.data(), point) - component(0),
-                          hn::GatherIndex(kFloat, points.y.data(), point) - component(1),
-                          hn::GatherIndex(kFloat, points.z.data(), point) - component(2)};
-        const ClosestLanes found = closest_on_triangles(from, {component(3), component(4), component(5)},
-                                                        {component(6), component(7), component(8)});
-        hn::Store(found.u, kFloat, &pairs.u[i]);
-        hn::Store(found.v, kFloat, &pairs.v[i]);
-        hn::Store(found.squared, kFloat, &pairs.distance_squared[i]);
+        Ints point;
+        if constexpr (kFirst) {
+            point = hn::Iota(kInt, static_cast<std::int32_t>(i));
+        } else {
+            point = hn::Load(kInt, &open[i]);
+        }
+        const auto of_point = [&](auto tag, const auto& column) HWY_ATTR {
+            if constexpr (kFirst)
+                return hn::Load(tag, &column[i]);
+            else
+                return hn::GatherIndex(tag, column.data(), point);
+        };
+        const Ints first = of_point(kInt, points.cell) * hn::Set(kInt, kCellWords);
+        const Ints number = hn::GatherIndex(kInt, lists, first);
+        const Ints next = place < 7 ? hn::GatherIndex(kInt, lists + 1, first) : none;
+        const auto is_named = hn::Not(hn::Lt(number, zero));
+        const TriangleLanes triangle(table, hn::Max(number, zero));
+        const Vector from{of_point(kFloat, points.x) - triangle.a.x,
+                          of_point(kFloat, points.y) - triangle.a.y,
+                          of_point(kFloat, points.z) - triangle.a.z};
+        const ClosestLanes found = closest_on_triangles(from, triangle.ab, triangle.ac);
+        if constexpr (kFirst) {
+            hn::Store(number, kInt, &points.triangle[i]);
+            hn::Store(hn::IfThenElse(hn::RebindMask(kFloat, is_named), found.squared, hn::Set(kFloat, 1e30f)),
+                      kFloat, &points.distance_squared[i]);
+            hn::Store(found.u, kFloat, &points.u[i]);
+            hn::Store(found.v, kFloat, &points.v[i]);
+        } else {
+            const Floats best = of_point(kFloat, points.distance_squared);
+            const auto nearer = hn::And(hn::RebindMask(kFloat, is_named), hn::Lt(found.squared, best));
+            if (!hn::AllFalse(kFloat, nearer)) {
+                const auto keep = [&](Floats value, core::Column<float>& column) HWY_ATTR {
+                    hn::ScatterIndex(hn::IfThenElse(nearer, value, of_point(kFloat, column)), kFloat,
+                                     column.data(), point);
+                };
+                keep(found.squared, points.distance_squared);
+                keep(found.u, points.u);
+                keep(found.v, points.v);
+                hn::ScatterIndex(
+                    hn::IfThenElse(hn::RebindMask(kInt, nearer), number, of_point(kInt, points.triangle)),
+                    kInt, points.triangle.data(), point);
+            }
+        }
+        // Where the last vector is not full, its lanes beyond the end name nothing.
+        const auto goes_on = hn::Not(hn::Lt(next, zero));
+        hn::StoreU(hn::Compress(point, goes_on), kInt, open + longer);
+        longer += hn::CountTrue(kInt, goes_on);
+    }
+    return longer;
+}
+
+HWY_INLINE HWY_ATTR void find_sides(const SurfaceTable& table, SurfacePoints& points) {
+    for (std::size_t i = 0; i < points.size(); i += hn::Lanes(kFloat)) {
+        const TriangleLanes triangle(table, hn::Max(hn::Load(kInt, &points.triangle[i]), hn::Zero(kInt)));
+        const Vector &b = triangle.ab, &c = triangle.ac;
+        const Vector normal{b.y * c.z - c.y * b.z, b.z * c.x - c.z * b.x, b.x * c.y - c.x * b.y};
+        const Vector direction{hn::Load(kFloat, &points.direction_x[i]),
+                               hn::Load(kFloat, &points.direction_y[i]),
+                               hn::Load(kFloat, &points.direction_z[i])};
+        const auto is_front = hn::RebindMask(kInt, hn::Lt(dot(direction, normal), hn::Zero(kFloat)));
+        hn::Store(hn::IfThenElseZero(is_front, hn::Set(kInt, 1)), kInt, &points.is_front[i]);
     }
 }
 
 HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
-    // Every triangle that a crossing's cell names makes a pair, so that no lane waits for another's cell. By
-    // the time they are measured, the triangles are in the cache.
-    SurfacePoints::Pairs& pairs = points.pairs;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        for (const std::int32_t triangle : table.cells[points.cell[i]].triangle) {
-            if (triangle < 0) break;
-            pairs.point[count] = static_cast<std::int32_t>(i);
-            pairs.triangle[count] = triangle;
-            ++count;
-            const VoxelTriangle* record = &table.triangles[triangle];
-            __builtin_prefetch(record);
-            __builtin_prefetch(reinterpret_cast<const char*>(record + 1) - 1);
-        }
-    }
-    for (std::size_t i = count; i % hn::Lanes(kFloat) != 0; ++i) {
-        pairs.point[i] = 0;
-        pairs.triangle[i] = 0;
-    }
     find_gradients(table, points);
-    measure_pairs(table, points, count);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        points.triangle[i] = -1;
-        points.distance_squared[i] = 1e30f;
+    // No lane waits for another whose cell names more triangles: the first triangles of all, the second ones
+    // of those that have two, and so on.
+    std::int32_t* open = points.work.data();
+    std::size_t count = measure_triangles<true>(table, points, 0, open, points.size());
+    for (int place = 1; count > 0; ++place) {
+        // A crossing that is no one's fills the last vector up.
+        for (std::size_t i = count; i % hn::Lanes(kFloat) != 0; ++i) {
+            open[i] = static_cast<std::int32_t>(points.spare());
+        }
+        count = measure_triangles<false>(table, points, place, open, count);
     }
-    for (std::size_t k = 0; k < count; ++k) {
-        // Ascending: of equally close ones the first stays.
-        const auto i = static_cast<std::size_t>(pairs.point[k]);
-        if (!(pairs.distance_squared[k] < points.distance_squared[i])) continue;
-        points.distance_squared[i] = pairs.distance_squared[k];
-        points.triangle[i] = pairs.triangle[k];
-        points.u[i] = pairs.u[k];
-        points.v[i] = pairs.v[k];
-    }
+    find_sides(table, points);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -189,40 +240,31 @@ std::int32_t stored_gradient(const glm::dvec3& gradient) {
                                      component(gradient.z) << 2);
 }
 
-std::int32_t surface_cell(const SurfaceTable& table, const MarchHit& hit) {
-    const BrickCells& cells = table.bricks[hit.brick];
-    const int x = hit.cell[0] % kBrickCells, y = hit.cell[1] % kBrickCells, z = hit.cell[2] % kBrickCells;
-    // A crossing in the very face of a cell may be seen from the empty one beyond it: all that lie below or
-    // at it have been counted, and one of them is next to it.
-    const int last =
-        std::max(cells.before[kBrickCells - 1] + std::popcount(cells.occupied[kBrickCells - 1]) - 1, 0);
-    return cells.first + std::min(cells.rank(x, y, z), last);
-}
-
-void SurfacePoints::set(const SurfaceTable& table, std::size_t index, const MarchRay& ray,
-                        const MarchHit& hit) {
+void SurfacePoints::set(std::size_t index, const MarchRay& ray, const MarchHit& hit) {
     x[index] = ray.origin[0] + hit.distance * ray.direction[0];
     y[index] = ray.origin[1] + hit.distance * ray.direction[1];
     z[index] = ray.origin[2] + hit.distance * ray.direction[2];
+    direction_x[index] = ray.direction[0];
+    direction_y[index] = ray.direction[1];
+    direction_z[index] = ray.direction[2];
     cell_x[index] = hit.cell[0];
     cell_y[index] = hit.cell[1];
     cell_z[index] = hit.cell[2];
-    cell[index] = surface_cell(table, hit);
-    __builtin_prefetch(&table.cells[cell[index]]);
+    cell[index] = hit.surface;
 }
 
 void SurfacePoints::resize(std::size_t count) {
     size_ = count;
-    const std::size_t padded = core::padded_stream_size(count);
-    const auto widen = [](std::size_t size, auto&... columns) {
-        ((columns.size() < size ? columns.resize(size) : void()), ...);
+    // One vector more than is filled: the spare crossing.
+    const std::size_t padded = core::padded_stream_size(count), room = padded + core::kStreamLanes;
+    const auto widen = [room](auto&... columns) {
+        ((columns.size() < room ? columns.resize(room) : void()), ...);
     };
-    widen(padded, x, y, z, cell_x, cell_y, cell_z, cell, gradient_x, gradient_y, gradient_z, triangle, u, v,
-          distance_squared);
-    const std::size_t most_pairs = core::padded_stream_size(8 * count);
-    widen(most_pairs, pairs.point, pairs.triangle, pairs.u, pairs.v, pairs.distance_squared);
-    for (std::size_t i = count; i < padded; ++i) {
-        x[i] = y[i] = z[i] = cell_x[i] = cell_y[i] = cell_z[i] = 0.0f;
+    widen(x, y, z, direction_x, direction_y, direction_z, cell_x, cell_y, cell_z, cell, gradient_x,
+          gradient_y, gradient_z, triangle, u, v, distance_squared, is_front, work);
+    for (std::size_t i = count; i < room; ++i) {
+        x[i] = y[i] = z[i] = direction_x[i] = direction_y[i] = direction_z[i] = 0.0f;
+        cell_x[i] = cell_y[i] = cell_z[i] = 0.0f;
         cell[i] = 0;
     }
 }

@@ -2,8 +2,6 @@
 // for many crossings at once.
 #pragma once
 
-#include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -28,29 +26,8 @@ struct VoxelTriangle {
 inline constexpr float kGradientStep = 1.0f / 400.0f;
 std::int32_t stored_gradient(const glm::dvec3& gradient);
 
-/// What an occupied cell knows besides its samples.
-struct alignas(64) CellSurface {
-    std::int32_t gradient[8];  ///< At the corners, corner 4 x + 2 y + z.
-    std::int32_t triangle[8];  ///< The distinct ones that the corners name, ascending; the rest -1.
-};
-
-/// The occupied cells of a brick.
-struct BrickCells {
-    std::array<std::uint64_t, kBrickCells> occupied{};  ///< As in Brick.
-    std::array<std::uint16_t, kBrickCells> before{};    ///< Occupied cells in the layers below.
-    std::int32_t first = 0;                             ///< Of its cells in SurfaceTable::cells.
-
-    /// Which of the brick's cells, in the order of `occupied`, a cell is. @pre it is occupied
-    int rank(int x, int y, int z) const {
-        const auto layer = static_cast<std::size_t>(x);
-        const std::uint64_t below = (std::uint64_t{1} << (kBrickCells * y + z)) - 1;
-        return before[layer] + std::popcount(occupied[layer] & below);
-    }
-};
-
-/// The surface of all fields; bricks and triangles are numbered over all of them.
+/// Where the surface of all fields is kept; triangles are numbered over all of them.
 struct SurfaceTable {
-    const BrickCells* bricks = nullptr;
     const CellSurface* cells = nullptr;
     const VoxelTriangle* triangles = nullptr;
 };
@@ -58,7 +35,8 @@ struct SurfaceTable {
 /// Crossings and what was found there, one column a component, at least as long as whole vectors need.
 struct SurfacePoints {
     // In.
-    core::Column<float> x, y, z;                 ///< Voxel coordinates.
+    core::Column<float> x, y, z;                                ///< Voxel coordinates.
+    core::Column<float> direction_x, direction_y, direction_z;  ///< Of the ray, voxels.
     core::Column<float> cell_x, cell_y, cell_z;  ///< The cell's lowest corner, voxel coordinates.
     core::Column<std::int32_t> cell;             ///< Its entry in SurfaceTable::cells.
     // Out.
@@ -67,19 +45,17 @@ struct SurfacePoints {
         triangle;              ///< The closest of the cell's corners' triangles; -1: they name none.
     core::Column<float> u, v;  ///< Barycentrics of its closest point: second and third corner.
     core::Column<float> distance_squared;  ///< From that point, voxels.
+    core::Column<std::int32_t> is_front;   ///< Whether the ray comes from that triangle's front.
 
     std::size_t size() const { return size_; }
     /// Padding is filled with crossings of the first cell.
     void resize(std::size_t count);
     /// Sets a crossing that march_rays() found.
-    void set(const SurfaceTable& table, std::size_t index, const MarchRay& ray, const MarchHit& hit);
+    void set(std::size_t index, const MarchRay& ray, const MarchHit& hit);
 
-    /// A crossing and a triangle that may be the closest, for find_surface().
-    struct Pairs {
-        core::Column<std::int32_t> point, triangle;
-        core::Column<float> u, v, distance_squared;
-    };
-    Pairs pairs;
+    core::Column<std::int32_t> work;  ///< For find_surface().
+    /// The number of a crossing that is there and nobody's.
+    std::size_t spare() const { return core::padded_stream_size(size_); }
 
 private:
     std::size_t size_ = 0;
@@ -88,8 +64,5 @@ private:
 /// Fills the columns marked Out. The gradient is the trilinear mean of the corners' gradients; among equally
 /// close triangles the lowest number wins. Same bits on every instruction set.
 void find_surface(const SurfaceTable& table, SurfacePoints& points);
-
-/// @returns the entry of a crossing's cell in SurfaceTable::cells
-std::int32_t surface_cell(const SurfaceTable& table, const MarchHit& hit);
 
 }  // namespace sdf

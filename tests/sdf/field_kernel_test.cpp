@@ -174,7 +174,7 @@ TEST_F(FieldKernel, SurfacePointsAreTheClosestTrianglesAndTheMeanGradient) {
         const TargetInUse in_use(target);
         sdf::SurfacePoints points;
         points.resize(met.size());
-        for (std::size_t k = 0; k < met.size(); ++k) points.set(atlas_.surface_table(), k, rays[met[k]], hits[met[k]]);
+        for (std::size_t k = 0; k < met.size(); ++k) points.set(k, rays[met[k]], hits[met[k]]);
         sdf::find_surface(atlas_.surface_table(), points);
         for (std::size_t k = 0; k < met.size(); ++k) {
             const sdf::MarchHit& hit = hits[met[k]];
@@ -189,6 +189,12 @@ TEST_F(FieldKernel, SurfacePointsAreTheClosestTrianglesAndTheMeanGradient) {
             if (static_cast<std::uint32_t>(points.triangle[k]) == closest.index) {
                 EXPECT_NEAR(points.u[k], closest.point.barycentrics.x, 2e-4);
                 EXPECT_NEAR(points.v[k], closest.point.barycentrics.y, 2e-4);
+            }
+            const double facing =
+                glm::dot(closest.corners.scaled_normal(),
+                         glm::dvec3(points.direction_x[k], points.direction_y[k], points.direction_z[k]));
+            if (static_cast<std::uint32_t>(points.triangle[k]) == closest.index && std::abs(facing) > 1e-6) {
+                EXPECT_EQ(points.is_front[k] != 0, facing < 0.0);
             }
             const glm::dvec3 u = glm::clamp(voxel - glm::dvec3(cell), 0.0, 1.0);
             const glm::dvec3 gradient = sdf::smooth_gradient(*grid_, cell, u);
