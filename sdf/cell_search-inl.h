@@ -246,7 +246,7 @@ HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, 
                     continue;
                 }
                 MarchHit& hit = hits[number];
-                hit.distance = hit_at[lane];
+                hit.distance = found_bits >> lane & 1 ? hit_at[lane] : 0.0f;
                 hit.brick = candidates.brick[i];
                 hit.surface = 0;
                 for (int axis = 0; axis < 3; ++axis) {

@@ -123,6 +123,9 @@ HWY_INLINE HWY_ATTR Floats first_root(const CubicLanes& cubic, Mask negative, Ma
     constexpr float kRootSteps = 0.01f;
     for (int i = 0; i < kIterations; ++i) {
         const Floats value = cubic.at(s);
+        const Mask is_root = hn::Lt(hn::Abs(value), hn::Set(kFloat, kRootSteps));
+        // Lanes without a crossing may never come to one.
+        if (hn::AllTrue(kFloat, hn::Or(is_root, hn::Not(found)))) break;
         const Mask before = hn::Not(differ(is_negative(value), negative));
         low = hn::IfThenElse(before, s, low);
         high = hn::IfThenElse(before, high, s);
@@ -130,7 +133,7 @@ HWY_INLINE HWY_ATTR Floats first_root(const CubicLanes& cubic, Mask negative, Ma
         const Mask inside = hn::And(hn::Ge(newton, low), hn::Le(newton, high));
         const Floats closer = hn::IfThenElse(inside, newton, hn::Set(kFloat, 0.5f) * (low + high));
         // At a double root the slope says nothing.
-        s = hn::IfThenElse(hn::Lt(hn::Abs(value), hn::Set(kFloat, kRootSteps)), s, closer);
+        s = hn::IfThenElse(is_root, s, closer);
     }
     return s;
 }
