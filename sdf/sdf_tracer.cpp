@@ -15,18 +15,17 @@ namespace sdf {
 
 namespace {
 
-/// All triangles of a mesh that a ray can meet, in local units.
-TriangleBvh triangle_tree(const core::Mesh& mesh) {
-    std::vector<Triangle> triangles(mesh.triangles.size());
+/// All triangles of a mesh that a ray can meet.
+TriangleRayTree triangle_tree(const core::Mesh& mesh) {
     std::vector<std::uint32_t> usable;
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
         const glm::uvec3& corners = mesh.triangles[i];
-        triangles[i] = {glm::dvec3(mesh.positions[corners.x]), glm::dvec3(mesh.positions[corners.y]),
-                        glm::dvec3(mesh.positions[corners.z])};
-        const double area = glm::length(triangles[i].scaled_normal());
-        if (area > 0.0 && std::isfinite(area)) usable.push_back(static_cast<std::uint32_t>(i));
+        const Triangle triangle{glm::dvec3(mesh.positions[corners.x]), glm::dvec3(mesh.positions[corners.y]),
+                                glm::dvec3(mesh.positions[corners.z])};
+        const double area = glm::length(triangle.scaled_normal());
+        if (area > 0.0 && std::isfinite(area)) usable.push_back(i);
     }
-    return TriangleBvh(triangles, usable);
+    return TriangleRayTree(mesh.positions, mesh.triangles, usable);
 }
 
 /// How far off an exact point of the mesh a ray must start not to meet the field that stands for it.
@@ -60,7 +59,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
       hit_mode_(hit_mode),
       has_alpha_(core::has_alpha(scene)) {
     assert(grids_.size() == scene.meshes.size());
-    triangles_.resize(grids_.size(), TriangleBvh({}, {}));
+    triangles_.resize(grids_.size());
     core::parallel_for(grids_.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (grids_[i] && grids_[i]->half_thickness_voxels() > 0.0) {
@@ -261,7 +260,7 @@ std::size_t SdfTracer::bytes() const {
     for (const auto& grid : grids_) {
         if (grid && counted.insert(grid.get()).second) total += grid->bytes();
     }
-    for (const TriangleBvh& triangles : triangles_) total += triangles.bytes();
+    for (const TriangleRayTree& triangles : triangles_) total += triangles.bytes();
     return total;
 }
 

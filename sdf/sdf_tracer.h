@@ -18,7 +18,7 @@
 #include "sdf/field_table.h"
 #include "sdf/instance_tree.h"
 #include "sdf/sphere_trace.h"
-#include "sdf/triangle_bvh.h"
+#include "sdf/triangle_ray_tree.h"
 
 namespace sdf {
 
@@ -58,7 +58,7 @@ public:
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
         FieldAtlas::Place place;
-        const TriangleBvh* triangles = nullptr;  ///< Of the mesh, local units; null if nothing is thickened.
+        const TriangleRayTree* triangles = nullptr;  ///< Of the mesh; null if nothing is thickened.
         glm::dmat3 voxel_from_world_direction{1.0};
         glm::mat3 world_from_voxel_gradient{1.0f};  ///< Up to a factor.
         glm::dvec3 voxel_origin{0.0};               ///< Voxel coordinates of the world's origin.
@@ -108,7 +108,7 @@ private:
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;
-    std::vector<TriangleBvh> triangles_;  ///< By mesh; empty where nothing is thickened.
+    std::vector<TriangleRayTree> triangles_;  ///< By mesh; empty where nothing is thickened.
     FieldAtlas atlas_;
     HitMode hit_mode_;
     std::vector<PlacedGrid> placed_;

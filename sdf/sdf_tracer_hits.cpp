@@ -45,7 +45,7 @@ bool SdfTracer::meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest
     const glm::dvec3 direction = h * ray.direction;
     t_max = std::min(t_max, ray.t_max);
     while (t_min <= t_max) {
-        const FirstHit met = ray.placed.triangles->first_hit(origin, direction, t_min, t_max);
+        const FirstHit met = ray.placed.triangles->hit({origin, direction, t_min, t_max});
         if (!met) break;
         const glm::uvec3& corner = ray.mesh.triangles[met.triangle];
         const Triangle triangle{glm::dvec3(ray.mesh.positions[corner.x]),
