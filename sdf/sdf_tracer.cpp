@@ -79,6 +79,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         placed.grid = grid;
         placed.place = atlas_.place(instance.mesh);
         placed.triangles = triangles_[instance.mesh].empty() ? nullptr : &triangles_[instance.mesh];
+        placed.is_sheet = placed.triangles && grid->info().mesh_class == MeshClass::kSheet;
         placed.is_opaque = !placed.triangles && !has_alpha_;
         placed.is_opaque_solid = grid->info().clean_level_set && !has_alpha_;
         placed.voxel_from_world_direction = glm::dmat3(instance.local_from_world) / h;
@@ -148,6 +149,7 @@ void SdfTracer::march_active(bool any, Work& work) const {
                std::span(work.march_hits).first(count));
 
     work.met.clear();
+    work.going_on.clear();
     for (std::size_t i = 0; i < count; ++i) {
         Traced& traced = work.traced[work.active[i]];
         const MarchHit& march_hit = work.march_hits[i];
@@ -156,23 +158,25 @@ void SdfTracer::march_active(bool any, Work& work) const {
         if (march_hit.status == MarchStatus::kExhausted) traced.is_exhausted = true;
         const double t = traced.passage.t_at(march_hit);
         if (march_hit.status != MarchStatus::kHit || !(t <= traced.passage.t_max)) {
-            if (placed.triangles) finish_without_crossing(work.ray(work.active[i]), traced);
+            // Boxes of fields lie outside: only a ray that starts within may be in a shell.
+            const std::uint32_t slot = work.active[i];
+            const core::Ray ray = work.ray(slot);
+            if (placed.triangles && traced.passage.t_min <= ray.t_min) {
+                finish_without_crossing(local_ray(ray, slot, traced, any), traced);
+            }
         } else if (any && placed.is_opaque_solid) {
             traced.nearest.t = t;
             traced.nearest.instance = traced.passage.instance;
+        } else if (placed.is_sheet) {
+            LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
+            take_or_go_on(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), {}, work);
         } else {
             work.met.push_back(static_cast<std::uint32_t>(i));
         }
     }
-    if (work.met.empty()) return;
-    work.surface.resize(work.met.size());
-    for (std::size_t i = 0; i < work.met.size(); ++i) {
-        work.surface.set(i, work.march_rays[work.met[i]], work.march_hits[work.met[i]]);
-    }
-    find_surface(atlas_.surface_table(), work.surface);
-    for (std::size_t i = 0; i < work.met.size(); ++i) {
-        finish_crossing(work, i, work.traced[work.active[work.met[i]]]);
-    }
+    find_surfaces(work);
+    for (std::size_t i = 0; i < work.met.size(); ++i) finish_crossing(i, any, work);
+    go_on(work);
 }
 
 void SdfTracer::trace_block(std::size_t begin, std::size_t end, bool any, Work& work) const {

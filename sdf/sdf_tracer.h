@@ -64,6 +64,7 @@ public:
         glm::dvec3 voxel_origin{0.0};               ///< Voxel coordinates of the world's origin.
         double world_from_voxel_scale = 1.0;        ///< Largest stretch of one voxel, in world units.
         float start_offset = 0.0f;
+        bool is_sheet = false;         ///< Nothing but shells.
         bool is_opaque = false;        ///< No shells and no alpha.
         bool is_opaque_solid = false;  ///< Every crossing is a visible surface.
     };
@@ -85,20 +86,29 @@ private:
     void enter_next_instances(Work& work) const;
     /// Takes all active rays through the field that each has come to.
     void march_active(bool any, Work& work) const;
-    /// Takes the crossing that the kernels found, number `at` of work.met, and looks on if it is none.
-    void finish_crossing(const Work& work, std::size_t at, Traced& traced) const;
-    /// The end of a passage where thickened features are and the kernel found nothing.
-    void finish_without_crossing(const core::Ray& ray, Traced& traced) const;
-    /// Looks for the first visible surface without a kernel, from crossing to crossing.
-    void walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const;
-    LocalRay local_ray(const core::Ray& ray, const Traced& traced) const;
+    /// Takes the crossing that the kernels found, number `at` of work.met, or adds it to work.going_on.
+    void finish_crossing(std::size_t at, bool any, Work& work) const;
+    /// The end of a passage that began within a field with thickened features and came to no crossing.
+    void finish_without_crossing(LocalRay local, Traced& traced) const;
+    /// Fills work.surface with what lies at the crossings of work.met.
+    void find_surfaces(Work& work) const;
+    /// Takes the rays of work.going_on to their first visible surface or to the end of their passage.
+    void go_on(Work& work) const;
+    /// The same for one ray without a kernel, from crossing to crossing.
+    void walk_crossings(LocalRay& local, Traced& traced) const;
+    LocalRay local_ray(const core::Ray& ray, std::uint32_t slot, const Traced& traced, bool any) const;
+    /// The rest of a passage, for the kernels.
+    MarchRay march_ray(const LocalRay& local, const Passage& passage) const;
+    static Crossing crossing_of(const MarchHit& march_hit, double from, const Passage& passage);
     void keep_nearer(const Nearest& found, Traced& traced) const;
+    /// Takes a crossing if it is a visible surface; else the ray goes on.
+    void take_or_go_on(LocalRay& local, const Crossing& crossing, const Surface& here, Work& work) const;
     /// Whether a crossing is a visible surface, and which.
     bool accept(LocalRay& ray, const Crossing& crossing, const Surface& here, Nearest& found) const;
     Surface surface_at(const LocalRay& ray, const Crossing& crossing) const;
     Surface surface_found(const Work& work, std::size_t at, std::int32_t triangle_base) const;
     /// Where the ray ends within a shell.
-    void meet_shell_at_end(LocalRay& local, double t_max, Nearest& found) const;
+    void meet_shell_at_end(LocalRay& local, Traced& traced) const;
     /// Finds the first visible triangle that the ray truly meets in [t_min, t_max].
     bool meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const;
     /// The normal that faces the ray: of the triangle itself, or of the field.
