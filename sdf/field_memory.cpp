@@ -1,7 +1,7 @@
 #include "sdf/field_memory.h"
 
 #include "sdf/field_table.h"
-#include "sdf/triangle_bvh.h"
+#include "sdf/triangle_ray_tree.h"
 
 namespace sdf {
 
@@ -18,7 +18,7 @@ FieldMemory field_memory(const BrickGrid& grid, std::size_t triangle_count) {
                           kOctants * grid.top().size() * sizeof(std::int32_t);
         memory.triangles += triangle_count * sizeof(VoxelTriangle);
     }
-    if (grid.half_thickness_voxels() > 0.0) memory.triangles += TriangleBvh::bytes_of(triangle_count);
+    if (grid.half_thickness_voxels() > 0.0) memory.triangles += TriangleRayTree::bytes_of(triangle_count);
     return memory;
 }
 

@@ -32,8 +32,8 @@ HWY_INLINE HWY_ATTR void push_children(InstanceTree::Walk& walk, const InstanceT
         for (int axis = 0; axis < 3; ++axis) {
             const Floats origin = hn::Set(kFloat, walk.origin[axis]),
                          inverse = hn::Set(kFloat, walk.inverse[axis]);
-            const Floats a = (hn::Load(kFloat, node.low[axis] + first) - origin) * inverse;
-            const Floats b = (hn::Load(kFloat, node.high[axis] + first) - origin) * inverse;
+            const Floats a = (hn::Load(kFloat, node.bound[0][axis] + first) - origin) * inverse;
+            const Floats b = (hn::Load(kFloat, node.bound[1][axis] + first) - origin) * inverse;
             near = hn::Max(near, hn::Min(a, b));
             far = hn::Min(far, hn::Max(a, b) * hn::Set(kFloat, kFarther));
         }

@@ -1,7 +1,6 @@
 // sdf/instance_tree.h: a bounding volume hierarchy over the world boxes of instances.
 //
-// Eight children a node, so that one test of a ray against all of them fills a vector. Boxes are single
-// precision, rounded outwards; what they let through is clipped exactly later, in each field's own space.
+// What its boxes let through is clipped exactly later, in each field's own space.
 #pragma once
 
 #include <cstddef>
@@ -12,21 +11,16 @@
 
 #include "core/math/bounds.h"
 #include "core/math/ray.h"
+#include "sdf/box_tree.h"
 
 namespace sdf {
 
 /// Walked front to back with pruning at the nearest hit so far.
 class InstanceTree {
 public:
-    static constexpr std::size_t kWidth = 8;
-    /// Children that wait at most, whatever the tree: the constructor sees to it.
-    static constexpr std::size_t kStackSize = 96;
-
-    struct alignas(64) Node {
-        float low[3][kWidth], high[3][kWidth];
-        std::int32_t child[kWidth];  ///< Node numbers, or ~instance.
-        std::uint32_t used;          ///< One bit a child that there is.
-    };
+    static constexpr std::size_t kWidth = BoxTree::kWidth;
+    static constexpr std::size_t kStackSize = BoxTree::kStackSize;
+    using Node = BoxTree::Node;  ///< Its children: node numbers, or ~instance.
 
     /// One box an instance; empty boxes are never visited.
     InstanceTree() = default;

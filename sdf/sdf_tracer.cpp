@@ -15,18 +15,17 @@ namespace sdf {
 
 namespace {
 
-/// All triangles of a mesh that a ray can meet, in local units.
-TriangleBvh triangle_tree(const core::Mesh& mesh) {
-    std::vector<Triangle> triangles(mesh.triangles.size());
+/// All triangles of a mesh that a ray can meet.
+TriangleRayTree triangle_tree(const core::Mesh& mesh) {
     std::vector<std::uint32_t> usable;
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
         const glm::uvec3& corners = mesh.triangles[i];
-        triangles[i] = {glm::dvec3(mesh.positions[corners.x]), glm::dvec3(mesh.positions[corners.y]),
-                        glm::dvec3(mesh.positions[corners.z])};
-        const double area = glm::length(triangles[i].scaled_normal());
-        if (area > 0.0 && std::isfinite(area)) usable.push_back(static_cast<std::uint32_t>(i));
+        const Triangle triangle{glm::dvec3(mesh.positions[corners.x]), glm::dvec3(mesh.positions[corners.y]),
+                                glm::dvec3(mesh.positions[corners.z])};
+        const double area = glm::length(triangle.scaled_normal());
+        if (area > 0.0 && std::isfinite(area)) usable.push_back(i);
     }
-    return TriangleBvh(triangles, usable);
+    return TriangleRayTree(mesh.positions, mesh.triangles, usable);
 }
 
 /// How far off an exact point of the mesh a ray must start not to meet the field that stands for it.
@@ -51,6 +50,17 @@ FieldPlacement placement_of(const SdfTracer::PlacedGrid& placed) {
     return placement;
 }
 
+HitPlacement hit_placement_of(const SdfTracer::PlacedGrid& placed) {
+    HitPlacement placement;
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int row = 0; row < 3; ++row) {
+            placement.world_from_gradient[3 * axis + row] = placed.world_from_voxel_gradient[axis][row];
+        }
+    }
+    placement.clearance = static_cast<float>(kSurfaceClearanceVoxels * placed.world_from_voxel_scale);
+    return placement;
+}
+
 }  // namespace
 
 SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const BrickGrid>> grids,
@@ -61,7 +71,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
       hit_mode_(hit_mode),
       has_alpha_(core::has_alpha(scene)) {
     assert(grids_.size() == scene.meshes.size());
-    triangles_.resize(grids_.size(), TriangleBvh({}, {}));
+    triangles_.resize(grids_.size());
     core::parallel_for(grids_.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (grids_[i] && grids_[i]->half_thickness_voxels() > 0.0) {
@@ -72,6 +82,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
     std::vector<core::DoubleBounds> boxes(scene.instances.size());
     placed_.resize(scene.instances.size());
     placements_.resize(scene.instances.size());
+    hit_placements_.resize(scene.instances.size());
     for (std::size_t i = 0; i < scene.instances.size(); ++i) {
         const core::Instance& instance = scene.instances[i];
         const BrickGrid* grid = grids_[instance.mesh].get();
@@ -81,6 +92,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         placed.grid = grid;
         placed.place = atlas_.place(instance.mesh);
         placed.triangles = triangles_[instance.mesh].empty() ? nullptr : &triangles_[instance.mesh];
+        placed.is_sheet = placed.triangles && grid->info().mesh_class == MeshClass::kSheet;
         placed.is_opaque = !placed.triangles && !has_alpha_;
         placed.is_opaque_solid = grid->info().clean_level_set && !has_alpha_;
         placed.voxel_from_world_direction = glm::dmat3(instance.local_from_world) / h;
@@ -89,6 +101,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         placed.voxel_origin = (glm::dvec3(instance.local_from_world[3]) - grid->origin()) / h;
         placed.world_from_voxel_scale = largest_singular_value(glm::dmat3(instance.world_from_local)) * h;
         placements_[i] = placement_of(placed);
+        hit_placements_[i] = hit_placement_of(placed);
         boxes[i] = core::transformed(grid->local_bounds(), instance.world_from_local);
         const double reach = glm::length(glm::max(glm::abs(boxes[i].minimum), glm::abs(boxes[i].maximum)));
         placed.start_offset = static_cast<float>(
@@ -150,6 +163,7 @@ void SdfTracer::march_active(bool any, Work& work) const {
                std::span(work.march_hits).first(count));
 
     work.met.clear();
+    work.going_on.clear();
     for (std::size_t i = 0; i < count; ++i) {
         Traced& traced = work.traced[work.active[i]];
         const MarchHit& march_hit = work.march_hits[i];
@@ -158,23 +172,25 @@ void SdfTracer::march_active(bool any, Work& work) const {
         if (march_hit.status == MarchStatus::kExhausted) traced.is_exhausted = true;
         const double t = traced.passage.t_at(march_hit);
         if (march_hit.status != MarchStatus::kHit || !(t <= traced.passage.t_max)) {
-            if (placed.triangles) finish_without_crossing(work.ray(work.active[i]), traced);
+            // Boxes of fields lie outside: only a ray that starts within may be in a shell.
+            const std::uint32_t slot = work.active[i];
+            const core::Ray ray = work.ray(slot);
+            if (placed.triangles && traced.passage.t_min <= ray.t_min) {
+                finish_without_crossing(local_ray(ray, slot, traced, any), traced);
+            }
         } else if (any && placed.is_opaque_solid) {
             traced.nearest.t = t;
             traced.nearest.instance = traced.passage.instance;
+        } else if (placed.is_sheet) {
+            LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
+            take_or_go_on(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), {}, work);
         } else {
             work.met.push_back(static_cast<std::uint32_t>(i));
         }
     }
-    if (work.met.empty()) return;
-    work.surface.resize(work.met.size());
-    for (std::size_t i = 0; i < work.met.size(); ++i) {
-        work.surface.set(i, work.march_rays[work.met[i]], work.march_hits[work.met[i]]);
-    }
-    find_surface(atlas_.surface_table(), work.surface);
-    for (std::size_t i = 0; i < work.met.size(); ++i) {
-        finish_crossing(work, i, work.traced[work.active[work.met[i]]]);
-    }
+    find_surfaces(work);
+    for (std::size_t i = 0; i < work.met.size(); ++i) finish_crossing(i, any, work);
+    go_on(work);
 }
 
 void SdfTracer::trace_block(std::size_t begin, std::size_t end, bool any, Work& work) const {
@@ -216,12 +232,11 @@ void SdfTracer::trace(const core::RayStream& rays, bool any, const Finished& fin
     for (std::size_t begin = 0; begin < rays.size(); begin += kBlockRays) {
         const std::size_t end = std::min(begin + kBlockRays, rays.size());
         trace_block(begin, end, any, work);
-        for (std::size_t i = begin; i < end; ++i) {
-            const Traced& traced = work.traced[i - begin];
-            steps += traced.steps;
-            exhausted += traced.is_exhausted;
-            finished(i, traced);
+        for (std::size_t slot = 0; slot < end - begin; ++slot) {
+            steps += work.traced[slot].steps;
+            exhausted += work.traced[slot].is_exhausted;
         }
+        finished(begin, end, work);
     }
     ray_count_.fetch_add(rays.size(), std::memory_order_relaxed);
     step_count_.fetch_add(steps, std::memory_order_relaxed);
@@ -230,21 +245,28 @@ void SdfTracer::trace(const core::RayStream& rays, bool any, const Finished& fin
 
 void SdfTracer::trace_closest(const core::RayStream& rays, core::HitStream& hits) const {
     hits.resize(rays.size());
-    hits.fill_with_misses();
-    trace(rays, false, [&](std::size_t i, const Traced& traced) {
-        if (traced.nearest.found()) {
-            hits.set(i, finish(rays.get(i), traced));
-        } else if (traced.is_exhausted) {
-            hits.status[i] = core::HitStatus::kExhausted;
+    trace(rays, false, [&](std::size_t begin, std::size_t end, const Work& work) {
+        finish_hits(rays, begin, end - begin, &work.traced[0].nearest, sizeof(Traced), hit_placements_.data(),
+                    hits);
+        for (std::size_t i = begin; i < end; ++i) {
+            const Traced& traced = work.traced[i - begin];
+            if (!traced.nearest.found()) {
+                if (traced.is_exhausted) hits.status[i] = core::HitStatus::kExhausted;
+            } else if (!traced.nearest.has_field_normal()) {
+                hits.set(i, finish(rays.get(i), traced.nearest));
+            }
+            hits.steps[i] = traced.steps;
         }
-        hits.steps[i] = traced.steps;
     });
 }
 
 void SdfTracer::trace_occluded(const core::RayStream& rays, std::span<std::uint8_t> occluded) const {
     assert(occluded.size() == rays.size());
-    trace(rays, true,
-          [&](std::size_t i, const Traced& traced) { occluded[i] = traced.nearest.found() ? 1 : 0; });
+    trace(rays, true, [&](std::size_t begin, std::size_t end, const Work& work) {
+        for (std::size_t i = begin; i < end; ++i) {
+            occluded[i] = work.traced[i - begin].nearest.found() ? 1 : 0;
+        }
+    });
 }
 
 float SdfTracer::start_offset(std::uint32_t instance) const {
@@ -262,7 +284,7 @@ std::size_t SdfTracer::bytes() const {
     for (const auto& grid : grids_) {
         if (grid && counted.insert(grid.get()).second) total += grid->bytes();
     }
-    for (const TriangleBvh& triangles : triangles_) total += triangles.bytes();
+    for (const TriangleRayTree& triangles : triangles_) total += triangles.bytes();
     return total;
 }
 

@@ -16,9 +16,10 @@
 #include "sdf/brick_grid.h"
 #include "sdf/entry_kernel.h"
 #include "sdf/field_table.h"
+#include "sdf/hit_kernel.h"
 #include "sdf/instance_tree.h"
 #include "sdf/sphere_trace.h"
-#include "sdf/triangle_bvh.h"
+#include "sdf/triangle_ray_tree.h"
 
 namespace sdf {
 
@@ -58,25 +59,26 @@ public:
     struct PlacedGrid {
         const BrickGrid* grid = nullptr;
         FieldAtlas::Place place;
-        const TriangleBvh* triangles = nullptr;  ///< Of the mesh, local units; null if nothing is thickened.
+        const TriangleRayTree* triangles = nullptr;  ///< Of the mesh; null if nothing is thickened.
         glm::dmat3 voxel_from_world_direction{1.0};
         glm::mat3 world_from_voxel_gradient{1.0f};  ///< Up to a factor.
         glm::dvec3 voxel_origin{0.0};               ///< Voxel coordinates of the world's origin.
         double world_from_voxel_scale = 1.0;        ///< Largest stretch of one voxel, in world units.
         float start_offset = 0.0f;
+        bool is_sheet = false;         ///< Nothing but shells.
         bool is_opaque = false;        ///< No shells and no alpha.
         bool is_opaque_solid = false;  ///< Every crossing is a visible surface.
     };
 
 private:
     struct LocalRay;
-    struct Nearest;
     struct Passage;
     struct Surface;
     struct Traced;
     struct Work;
 
-    /// The one path of both queries: finished(ray number, Traced&) for each. Stops at any hit if `any`.
+    /// The one path of both queries: finished(begin, end, Work&) for each block of rays. Stops at any hit if
+    /// `any`.
     template <typename Finished>
     void trace(const core::RayStream& rays, bool any, const Finished& finished) const;
     /// Traces rays begin to end - 1 together.
@@ -85,34 +87,44 @@ private:
     void enter_next_instances(Work& work) const;
     /// Takes all active rays through the field that each has come to.
     void march_active(bool any, Work& work) const;
-    /// Takes the crossing that the kernels found, number `at` of work.met, and looks on if it is none.
-    void finish_crossing(const Work& work, std::size_t at, Traced& traced) const;
-    /// The end of a passage where thickened features are and the kernel found nothing.
-    void finish_without_crossing(const core::Ray& ray, Traced& traced) const;
-    /// Looks for the first visible surface without a kernel, from crossing to crossing.
-    void walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const;
-    LocalRay local_ray(const core::Ray& ray, const Traced& traced) const;
-    void keep_nearer(const Nearest& found, Traced& traced) const;
+    /// Takes the crossing that the kernels found, number `at` of work.met, or adds it to work.going_on.
+    void finish_crossing(std::size_t at, bool any, Work& work) const;
+    /// The end of a passage that began within a field with thickened features and came to no crossing.
+    void finish_without_crossing(LocalRay local, Traced& traced) const;
+    /// Fills work.surface with what lies at the crossings of work.met.
+    void find_surfaces(Work& work) const;
+    /// Takes the rays of work.going_on to their first visible surface or to the end of their passage.
+    void go_on(Work& work) const;
+    /// The same for one ray without a kernel, from crossing to crossing.
+    void walk_crossings(LocalRay& local, Traced& traced) const;
+    LocalRay local_ray(const core::Ray& ray, std::uint32_t slot, const Traced& traced, bool any) const;
+    /// The rest of a passage, for the kernels.
+    MarchRay march_ray(const LocalRay& local, const Passage& passage) const;
+    static Crossing crossing_of(const MarchHit& march_hit, double from, const Passage& passage);
+    void keep_nearer(const NearestHit& found, Traced& traced) const;
+    /// Takes a crossing if it is a visible surface; else the ray goes on.
+    void take_or_go_on(LocalRay& local, const Crossing& crossing, const Surface& here, Work& work) const;
     /// Whether a crossing is a visible surface, and which.
-    bool accept(LocalRay& ray, const Crossing& crossing, const Surface& here, Nearest& found) const;
+    bool accept(LocalRay& ray, const Crossing& crossing, const Surface& here, NearestHit& found) const;
     Surface surface_at(const LocalRay& ray, const Crossing& crossing) const;
     Surface surface_found(const Work& work, std::size_t at, std::int32_t triangle_base) const;
     /// Where the ray ends within a shell.
-    void meet_shell_at_end(LocalRay& local, double t_max, Nearest& found) const;
+    void meet_shell_at_end(LocalRay& local, Traced& traced) const;
     /// Finds the first visible triangle that the ray truly meets in [t_min, t_max].
-    bool meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const;
+    bool meet_triangle(LocalRay& ray, double t_min, double t_max, NearestHit& found) const;
     /// The normal that faces the ray: of the triangle itself, or of the field.
-    glm::vec3 triangle_side(const core::Ray& ray, const Nearest& nearest) const;
-    glm::vec3 field_side(const core::Ray& ray, const Nearest& nearest) const;
-    core::Hit finish(const core::Ray& ray, const Traced& traced) const;
+    glm::vec3 triangle_side(const core::Ray& ray, const NearestHit& nearest) const;
+    glm::vec3 field_side(const core::Ray& ray, const NearestHit& nearest) const;
+    core::Hit finish(const core::Ray& ray, const NearestHit& nearest) const;
 
     const core::Scene& scene_;
     std::vector<std::shared_ptr<const BrickGrid>> grids_;
-    std::vector<TriangleBvh> triangles_;  ///< By mesh; empty where nothing is thickened.
+    std::vector<TriangleRayTree> triangles_;  ///< By mesh; empty where nothing is thickened.
     FieldAtlas atlas_;
     HitMode hit_mode_;
     std::vector<PlacedGrid> placed_;
-    std::vector<FieldPlacement> placements_;  ///< Of the same instances, for the kernel.
+    std::vector<FieldPlacement> placements_;  ///< Of the same instances, for the kernels.
+    std::vector<HitPlacement> hit_placements_;
     InstanceTree tree_;
     std::uint32_t only_instance_ = core::kNoIndex;  ///< If there is exactly one.
     bool has_alpha_ = false;

@@ -1,11 +1,7 @@
 // sdf/sdf_tracer_hits.cpp: from crossings of the field to hits of the scene.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "core/trace/surface.h"
-#include "sdf/cell_triangles.h"
-#include "sdf/distance.h"
 #include "sdf/sdf_tracer.h"
 #include "sdf/sdf_tracer_work.h"
 #include "sdf/sphere_trace.h"
@@ -13,21 +9,6 @@
 namespace sdf {
 
 namespace {
-
-/// A crossing farther than this from every stored triangle is the lid with which the winding number closes a
-/// hole of the mesh, and no surface. Where the sign changes at the mesh, the surface passes through the cell,
-/// whose diagonal is 1.74.
-constexpr double kFarthestTriangleVoxels = 2.0;
-
-/// Next to a thickened surface the shell covers plain ones as well. A crossing farther than this from its
-/// triangle lies on a shell: plain surfaces are nearer than 0.2 voxels.
-constexpr double kShellVoxels = 0.25;
-
-/// How far beyond the place where a ray comes into a shell its triangles are looked for at once. Whatever
-/// lies farther is looked for where the ray leaves the shell.
-constexpr double kShellPassageVoxels = 8.0;
-
-constexpr double kNever = std::numeric_limits<double>::infinity();
 
 glm::dvec3 triangle_normal(const core::Mesh& mesh, std::uint32_t index) {
     const glm::uvec3& corners = mesh.triangles[index];
@@ -37,85 +18,6 @@ glm::dvec3 triangle_normal(const core::Mesh& mesh, std::uint32_t index) {
 }
 
 }  // namespace
-
-bool SdfTracer::meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest& found) const {
-    const BrickGrid& grid = *ray.placed.grid;
-    const double h = grid.voxel_size();
-    const glm::dvec3 origin = grid.origin() + h * ray.origin;
-    const glm::dvec3 direction = h * ray.direction;
-    t_max = std::min(t_max, ray.t_max);
-    while (t_min <= t_max) {
-        const FirstHit met = ray.placed.triangles->first_hit(origin, direction, t_min, t_max);
-        if (!met) break;
-        const glm::uvec3& corner = ray.mesh.triangles[met.triangle];
-        const Triangle triangle{glm::dvec3(ray.mesh.positions[corner.x]),
-                                glm::dvec3(ray.mesh.positions[corner.y]),
-                                glm::dvec3(ray.mesh.positions[corner.z])};
-        found.barycentrics = glm::vec2(closest_point(triangle, origin + met.t * direction).barycentrics);
-        if (!has_alpha_ ||
-            core::is_visible(scene_, ray.instance, met.triangle, found.barycentrics, ray.world.seed)) {
-            found.t = met.t;
-            found.instance = ray.instance;
-            found.triangle = met.triangle;
-            found.is_front = glm::dot(direction, triangle.scaled_normal()) < 0.0;
-            found.is_triangle = true;
-            return true;
-        }
-        t_min = std::nextafter(met.t, kNever);
-    }
-    ray.unmet_since = std::max(ray.unmet_since, t_max);
-    return false;
-}
-
-bool SdfTracer::accept(LocalRay& ray, const Crossing& crossing, const Surface& here, Nearest& found) const {
-    ray.is_inside = crossing.enters_negative;
-    // The ray was inside a shell, or inside a solid that a shell runs into.
-    if (ray.placed.triangles && !crossing.enters_negative &&
-        meet_triangle(ray, ray.unmet_since, crossing.t, found)) {
-        return true;
-    }
-    if (here.triangle == kNoTriangle) return false;
-    const Feature feature = ray.placed.grid->feature(here.triangle);
-    const double farthest =
-        kFarthestTriangleVoxels + (feature == Feature::kSurface ? 0.0 : kHalfThicknessVoxels);
-    if (here.distance > farthest) return false;
-    if (feature != Feature::kSurface || (ray.placed.triangles && here.distance > kShellVoxels)) {
-        if (!crossing.enters_negative) return false;
-        // The field of a plain surface next to the shell may lie behind its triangles.
-        const double speed = glm::length(ray.direction);
-        return meet_triangle(ray, std::max(ray.unmet_since, crossing.t - kFarthestTriangleVoxels / speed),
-                             crossing.t + kShellPassageVoxels / speed, found);
-    }
-    if (has_alpha_ &&
-        !core::is_visible(scene_, ray.instance, here.triangle, here.barycentrics, ray.world.seed)) {
-        return false;
-    }
-    found.t = crossing.t;
-    found.instance = ray.instance;
-    found.triangle = here.triangle;
-    found.barycentrics = here.barycentrics;
-    found.is_front = here.is_front;
-    found.gradient = here.gradient;
-    found.enters_negative = crossing.enters_negative;
-    found.is_triangle = false;
-    return true;
-}
-
-SdfTracer::Surface SdfTracer::surface_at(const LocalRay& ray, const Crossing& crossing) const {
-    const BrickGrid& grid = *ray.placed.grid;
-    const glm::ivec3 cell = crossing.cell - crossing.cell / kBrickCells * kBrickCells;
-    const CellTriangles triangles(ray.mesh, grid, grid.brick_at(crossing.brick), cell);
-    const glm::dvec3 voxel = glm::dvec3(crossing.cell) + crossing.point;
-    const TriangleHit hit = triangles.closest(grid.origin() + grid.voxel_size() * voxel);
-    Surface here;
-    if (!hit) return here;
-    here.triangle = hit.index;
-    here.distance = hit.distance / grid.voxel_size();
-    here.barycentrics = glm::vec2(hit.point.barycentrics);
-    here.is_front = glm::dot(ray.direction, hit.corners.scaled_normal()) < 0.0;
-    here.gradient = glm::vec3(smooth_gradient(grid, crossing.cell, crossing.point));
-    return here;
-}
 
 SdfTracer::Surface SdfTracer::surface_found(const Work& work, std::size_t at,
                                             std::int32_t triangle_base) const {
@@ -130,44 +32,26 @@ SdfTracer::Surface SdfTracer::surface_found(const Work& work, std::size_t at,
     return here;
 }
 
-SdfTracer::LocalRay SdfTracer::local_ray(const core::Ray& ray, const Traced& traced) const {
-    const PlacedGrid& placed = placed_[traced.passage.instance];
-    LocalRay local{ray,
-                   traced.passage.instance,
-                   placed,
-                   scene_.meshes[scene_.instances[traced.passage.instance].mesh],
-                   placed.voxel_from_world_direction * glm::dvec3(ray.origin) + placed.voxel_origin,
-                   placed.voxel_from_world_direction * glm::dvec3(ray.direction),
-                   traced.nearest.t,
-                   ray.t_min,
-                   false};
-    if (placed.triangles) {
-        const glm::dvec3 start = local.origin + traced.passage.t_min * local.direction;
-        local.is_inside = distance_at(*placed.grid, start).value_or(1.0) < 0.0;
-    }
-    return local;
-}
-
-void SdfTracer::keep_nearer(const Nearest& found, Traced& traced) const {
+void SdfTracer::keep_nearer(const NearestHit& found, Traced& traced) const {
     // At equal distance the lowest instance wins, whatever the order of the walk.
-    Nearest& nearest = traced.nearest;
+    NearestHit& nearest = traced.nearest;
     if (found.found() && (found.t < nearest.t || !nearest.found() || found.instance < nearest.instance)) {
         nearest = found;
+        nearest.rounded_t = static_cast<float>(found.t);
     }
 }
 
-void SdfTracer::finish_crossing(const Work& work, std::size_t at, Traced& traced) const {
-    const std::uint32_t entry = work.met[at];
+void SdfTracer::finish_crossing(std::size_t at, bool any, Work& work) const {
+    const std::uint32_t entry = work.met[at], slot = work.active[entry];
     const MarchHit& march_hit = work.march_hits[entry];
+    Traced& traced = work.traced[slot];
     const Passage& passage = traced.passage;
     const PlacedGrid& placed = placed_[passage.instance];
     const Surface here = surface_found(work, at, placed.place.triangle_base);
-    Crossing crossing;
-    crossing.t = passage.t_at(march_hit);
-    crossing.enters_negative = march_hit.enters_negative;
-    Nearest found;
+    const Crossing crossing = crossing_of(march_hit, passage.t_min, passage);
     if (placed.is_opaque && here.triangle != kNoTriangle && here.distance <= kFarthestTriangleVoxels) {
         // What accept() would say, without a ray in double.
+        NearestHit found;
         found.t = crossing.t;
         found.instance = passage.instance;
         found.triangle = here.triangle;
@@ -175,50 +59,33 @@ void SdfTracer::finish_crossing(const Work& work, std::size_t at, Traced& traced
         found.is_front = here.is_front;
         found.gradient = here.gradient;
         found.enters_negative = crossing.enters_negative;
+        keep_nearer(found, traced);
     } else {
-        const core::Ray ray = work.ray(work.active[entry]);
-        LocalRay local = local_ray(ray, traced);
-        // What lies behind a crossing that is no visible surface is walked to one by one.
-        if (!accept(local, crossing, here, found)) walk_crossings(local, traced, found);
-        meet_shell_at_end(local, passage.t_max, found);
-    }
-    keep_nearer(found, traced);
-}
-
-void SdfTracer::finish_without_crossing(const core::Ray& ray, Traced& traced) const {
-    LocalRay local = local_ray(ray, traced);
-    Nearest found;
-    meet_shell_at_end(local, traced.passage.t_max, found);
-    keep_nearer(found, traced);
-}
-
-void SdfTracer::meet_shell_at_end(LocalRay& local, double t_max, Nearest& found) const {
-    if (local.placed.triangles && !found.found() && local.is_inside) {
-        meet_triangle(local, local.unmet_since, t_max, found);
+        LocalRay local = local_ray(work.ray(slot), slot, traced, any);
+        take_or_go_on(local, crossing, here, work);
     }
 }
 
-void SdfTracer::walk_crossings(LocalRay& local, Traced& traced, Nearest& found) const {
-    const Passage& passage = traced.passage;
-    RayMarch march(*local.placed.grid, local.origin, local.direction, passage.t_min, passage.t_max);
-    Crossing crossing;
-    while (!found.found() && march.next(crossing))
-        accept(local, crossing, surface_at(local, crossing), found);
-    traced.steps += march.steps();
-    traced.is_exhausted = traced.is_exhausted || march.is_exhausted();
+void SdfTracer::find_surfaces(Work& work) const {
+    if (work.met.empty()) return;
+    work.surface.resize(work.met.size());
+    for (std::size_t i = 0; i < work.met.size(); ++i) {
+        work.surface.set(i, work.march_rays[work.met[i]], work.march_hits[work.met[i]]);
+    }
+    find_surface(atlas_.surface_table(), work.surface);
 }
 
-glm::vec3 SdfTracer::triangle_side(const core::Ray& ray, const Nearest& nearest) const {
+glm::vec3 SdfTracer::triangle_side(const core::Ray& ray, const NearestHit& nearest) const {
     const core::Instance& instance = scene_.instances[nearest.instance];
     const glm::dvec3 normal = glm::normalize(glm::transpose(glm::dmat3(instance.local_from_world)) *
                                              triangle_normal(scene_.meshes[instance.mesh], nearest.triangle));
     return glm::vec3(glm::dot(normal, glm::dvec3(ray.direction)) > 0.0 ? -normal : normal);
 }
 
-glm::vec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) const {
+glm::vec3 SdfTracer::field_side(const core::Ray& ray, const NearestHit& nearest) const {
     const PlacedGrid& placed = placed_[nearest.instance];
     glm::vec3 gradient = nearest.gradient;
-    if (!(glm::dot(gradient, gradient) >= 1e-12f)) {
+    if (!nearest.has_field_normal()) {
         const core::Mesh& mesh = scene_.meshes[scene_.instances[nearest.instance].mesh];
         const glm::dvec3 normal = triangle_normal(mesh, nearest.triangle);
         const bool enters =
@@ -231,14 +98,12 @@ glm::vec3 SdfTracer::field_side(const core::Ray& ray, const Nearest& nearest) co
     const float cosine = glm::dot(normal, ray.direction);
     // The smooth normal may turn away from a ray that only just meets the surface. Its side stays what the
     // crossing says; it is tilted until it faces the ray.
-    constexpr float kFacing = 1e-6f;
     if (cosine > -kFacing) normal = glm::normalize(normal - (cosine + 2.0f * kFacing) * ray.direction);
     return normal;
 }
 
-core::Hit SdfTracer::finish(const core::Ray& ray, const Traced& traced) const {
+core::Hit SdfTracer::finish(const core::Ray& ray, const NearestHit& nearest) const {
     core::Hit hit;
-    const Nearest& nearest = traced.nearest;
     hit.status = core::HitStatus::kHit;
     hit.t = std::clamp(static_cast<float>(nearest.t), ray.t_min, ray.t_max);
     hit.normal = nearest.is_triangle ? triangle_side(ray, nearest) : field_side(ray, nearest);

@@ -10,6 +10,7 @@
 #include "core/math/ray.h"
 #include "core/scene/scene.h"
 #include "sdf/entry_kernel.h"
+#include "sdf/hit_kernel.h"
 #include "sdf/instance_tree.h"
 #include "sdf/sdf_tracer.h"
 #include "sdf/surface_kernel.h"
@@ -21,6 +22,11 @@ namespace sdf {
 /// r its radius in voxels.
 inline constexpr double kSurfaceClearanceVoxels = 0.05;
 
+/// A crossing farther than this from every stored triangle is the lid with which the winding number closes a
+/// hole of the mesh, and no surface. Where the sign changes at the mesh, the surface passes through the cell,
+/// whose diagonal is 1.74.
+inline constexpr double kFarthestTriangleVoxels = 2.0;
+
 /// Four units in the last place of a float of this magnitude.
 inline double four_ulp(double magnitude) {
     return 4.0 * magnitude * static_cast<double>(std::numeric_limits<float>::epsilon());
@@ -28,7 +34,8 @@ inline double four_ulp(double magnitude) {
 
 /// A ray in an instance's voxels, and what it has met there so far.
 struct SdfTracer::LocalRay {
-    const core::Ray& world;
+    core::Ray world;
+    std::uint32_t slot;  ///< Of the block's rays.
     std::uint32_t instance;
     const PlacedGrid& placed;
     const core::Mesh& mesh;
@@ -36,21 +43,9 @@ struct SdfTracer::LocalRay {
     glm::dvec3 direction;  ///< Voxels a world unit.
     double t_max;          ///< The nearest hit of other instances, or the ray's own end.
     double unmet_since;    ///< No visible triangle is met before; at first the ray's start.
-    bool is_inside;        ///< Whether the field is negative where the walk has come to.
-};
-
-/// The nearest visible crossing so far.
-struct SdfTracer::Nearest {
-    double t = 0.0;  ///< Until there is one: t_max.
-    std::uint32_t instance = core::kNoIndex;
-    std::uint32_t triangle = core::kNoIndex;
-    glm::vec2 barycentrics{0.0f};
-    glm::vec3 gradient{0.0f};  ///< Of the field, in voxels, where not is_triangle.
-    bool enters_negative = true;
-    bool is_front = true;
-    bool is_triangle = false;  ///< The ray meets the triangle itself, not the field that stands for it.
-
-    bool found() const { return instance != core::kNoIndex; }
+    double come_to;        ///< Where the walk goes on.
+    bool is_inside;        ///< Whether the field is negative there.
+    bool any;              ///< Whether any triangle will do, not the first alone.
 };
 
 /// A ray's way through the box of one instance's field.
@@ -64,7 +59,7 @@ struct SdfTracer::Passage {
 
 /// A ray on its way through the scene.
 struct SdfTracer::Traced {
-    Nearest nearest;
+    NearestHit nearest;
     Passage passage;
     std::uint32_t steps = 0;
     bool is_exhausted = false;
@@ -89,6 +84,8 @@ struct SdfTracer::Work {
     std::vector<MarchHit> march_hits{kBlockRays};
     std::vector<std::uint32_t> met;  ///< Entries of `active` whose crossing is looked up in `surface`.
     SurfacePoints surface;
+    std::vector<LocalRay> going_on;  ///< Rays whose crossing was no visible surface.
+    std::vector<LocalRay> walking;   ///< Those that the kernels take to their next.
 
     core::Ray ray(std::uint32_t slot) const { return rays->get(first_ray + slot); }
 };

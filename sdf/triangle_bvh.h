@@ -75,10 +75,6 @@ public:
     };
     const std::vector<Node>& nodes() const { return nodes_; }
     std::size_t bytes() const;
-    /// What a tree over so many triangles takes.
-    static std::size_t bytes_of(std::size_t triangle_count) {
-        return triangle_count * (sizeof(Node) + sizeof(std::uint32_t) + sizeof(Triangle));
-    }
     /// Triangles in leaf order.
     const std::vector<Triangle>& triangles() const { return triangles_; }
 
