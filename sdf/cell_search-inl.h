@@ -94,15 +94,11 @@ HWY_INLINE HWY_ATTR Corners load_corners(const FieldTable& fields, Ints brick, F
             low_half(w10), high_half(w10), low_half(w11), high_half(w11)};
 }
 
-/// Voxels that a ray must come nearer to the surface in each voxel of its way for HitMode::kEps to believe
-/// it.
-constexpr float kLeastDescent = 0.5f;
-
 /// Finds the crossing along a part of the ray through a cell. @param negative the sign that the ray brings
 /// @param root where, in parts of the way from `near` to `far`
 template <HitMode kMode>
 HWY_INLINE HWY_ATTR Mask find_crossing(const Corners& corners, const Point& near, const Point& far,
-                                       Floats at_near, Mask negative, Floats part, Floats& root) {
+                                       Floats at_near, Mask negative, Floats& root) {
     const Floats zero = hn::Zero(kFloat), one = hn::Set(kFloat, 1.0f);
     const Point way{far.x - near.x, far.y - near.y, far.z - near.z};
     Mask found;
@@ -114,8 +110,8 @@ HWY_INLINE HWY_ATTR Mask find_crossing(const Corners& corners, const Point& near
     const Mask at_once = differ(is_negative(at_near), negative);
     found = hn::Or(at_once, differ(is_negative(at_far), negative));
     Floats low = zero, high = one, at_low = at_near, at_high = at_far;
-    root = at_near / (at_near - at_far);
-    constexpr int kRefinements = kMode == HitMode::kEps ? 1 : 2;
+    root = at_low / (at_low - at_high);
+    constexpr int kRefinements = 2;
     for (int i = 0; i < kRefinements; ++i) {
         const Point at = along(near, way, root);
         const Floats at_root = corners.at(at.x, at.y, at.z);
@@ -124,18 +120,15 @@ HWY_INLINE HWY_ATTR Mask find_crossing(const Corners& corners, const Point& near
         at_low = hn::IfThenElse(before, at_root, at_low);
         high = hn::IfThenElse(before, high, root);
         at_high = hn::IfThenElse(before, at_high, at_root);
-        root = low + (high - low) * (at_low / (at_low - at_high));
-    }
-    if constexpr (kMode == HitMode::kEps) {
-        // Near enough, and coming nearer fast enough to be believed: where a ray skims the surface, the next
-        // cell knows better. Not moved further: a hit behind the surface would be a false start inside.
-        const Floats unit = hn::Set(kFloat, 1.0f / kSampleStepVoxels);
-        const Floats far_left = hn::Abs(at_far), descent = hn::Abs(at_near) - far_left;
-        const Mask near_enough =
-            hn::AndNot(found, hn::And(hn::Lt(far_left, hn::Set(kFloat, kHitEpsVoxels) * unit),
-                                      hn::Gt(descent, hn::Set(kFloat, kLeastDescent) * unit * part)));
-        root = hn::IfThenElse(near_enough, one, root);
-        found = hn::Or(found, near_enough);
+        const Floats closer = low + (high - low) * (at_low / (at_low - at_high));
+        if constexpr (kMode == HitMode::kEps) {
+            const Mask near_enough =
+                hn::Lt(hn::Abs(at_root), hn::Set(kFloat, kHitEpsVoxels / kSampleStepVoxels));
+            root = hn::IfThenElse(near_enough, root, closer);
+            if (hn::AllTrue(kFloat, hn::Or(near_enough, hn::Not(found)))) break;
+        } else {
+            root = closer;
+        }
     }
     root = hn::IfThenZeroElse(at_once, root);
     return found;
@@ -194,8 +187,7 @@ HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, 
             const Floats sign = hn::IfThenElse(hn::Eq(brought, zero), hn::CopySign(one, at_near), brought);
             const Floats part = exit - s;
             Floats root;
-            const Mask found =
-                find_crossing<kMode>(corners, near, far, at_near, is_negative(sign), part, root);
+            const Mask found = find_crossing<kMode>(corners, near, far, at_near, is_negative(sign), root);
             const Floats hit_s = s + root * part;
 
             // On to the next cell, as long as it is in the slab and in the brick.

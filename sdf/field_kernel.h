@@ -24,8 +24,7 @@ namespace sdf {
 
 /// How a crossing is found: the dial between accuracy and time.
 enum class HitMode : std::uint8_t {
-    kEps,     ///< Where a cell ends nearer than kHitEpsVoxels and the ray comes nearer still, or a change of
-              ///< sign over a cell, then two false positions.
+    kEps,     ///< A change of sign over a cell, then false positions until a sample is within kHitEpsVoxels.
     kSecant,  ///< A change of sign over a cell, then three false positions.
     kCubic,   ///< The first root of the cell's cubic: the exact surface of the trilinear field.
 };

@@ -80,7 +80,8 @@ HWY_ATTR void finish_hits(const core::RayStream& rays, std::size_t begin, std::s
         const Ints number = hn::Min(hn::Iota(kInt, static_cast<std::int32_t>(i)),
                                     hn::Set(kInt, static_cast<std::int32_t>(count) - 1));
         const Ints first = number * hn::Set(kInt, stride_words);
-        const auto int_at = [&](std::size_t word) HWY_ATTR { return hn::GatherIndex(kInt, words + word, first); };
+        const auto int_at = [&](std::size_t word)
+                                HWY_ATTR { return hn::GatherIndex(kInt, words + word, first); };
         const auto float_at = [&](std::size_t word) HWY_ATTR { return hn::BitCast(kFloat, int_at(word)); };
         const std::size_t at = begin + i;
         const Ints instance = int_at(FIELDLIGHT_WORD(instance));
@@ -110,14 +111,14 @@ HWY_ATTR void finish_hits(const core::RayStream& rays, std::size_t begin, std::s
         const Vector outwards = normalized({row(0), row(1), row(2)});
         static_assert(offsetof(NearestHit, is_front) == offsetof(NearestHit, enters_negative) + 1);
         const Ints flags = int_at(FIELDLIGHT_WORD(enters_negative));
-        const auto enters_negative =
-            hn::RebindMask(kFloat, hn::TestBit(flags, hn::Set(kInt, 1)));
+        const auto enters_negative = hn::RebindMask(kFloat, hn::TestBit(flags, hn::Set(kInt, 1)));
         const Floats side = hn::IfThenElse(enters_negative, hn::Set(kFloat, 1.0f), hn::Set(kFloat, -1.0f));
         Vector normal = scaled(outwards, side);
-        const Vector direction{hn::Load(kFloat, &rays.direction_x[at]), hn::Load(kFloat, &rays.direction_y[at]),
+        const Vector direction{hn::Load(kFloat, &rays.direction_x[at]),
+                               hn::Load(kFloat, &rays.direction_y[at]),
                                hn::Load(kFloat, &rays.direction_z[at])};
-        // The smooth normal may turn away from a ray that only just meets the surface. Its side stays what the
-        // crossing says; it is tilted until it faces the ray.
+        // The smooth normal may turn away from a ray that only just meets the surface. Its side stays what
+        // the crossing says; it is tilted until it faces the ray.
         const Floats cosine = dot(normal, direction), facing = hn::Set(kFloat, kFacing);
         const auto turned_away = hn::Gt(cosine, hn::Neg(facing));
         if (!hn::AllFalse(kFloat, turned_away)) {
@@ -128,8 +129,9 @@ HWY_ATTR void finish_hits(const core::RayStream& rays, std::size_t begin, std::s
                       hn::IfThenElse(turned_away, tilted.y, normal.y),
                       hn::IfThenElse(turned_away, tilted.z, normal.z)};
         }
-        const Floats t = hn::Min(hn::Max(float_at(FIELDLIGHT_WORD(rounded_t)), hn::Load(kFloat, &rays.t_min[at])),
-                                 hn::Load(kFloat, &rays.t_max[at]));
+        const Floats t =
+            hn::Min(hn::Max(float_at(FIELDLIGHT_WORD(rounded_t)), hn::Load(kFloat, &rays.t_min[at])),
+                    hn::Load(kFloat, &rays.t_max[at]));
         const Vector origin{hn::Load(kFloat, &rays.origin_x[at]), hn::Load(kFloat, &rays.origin_y[at]),
                             hn::Load(kFloat, &rays.origin_z[at])};
         const Vector position{origin.x + t * direction.x, origin.y + t * direction.y,
@@ -141,8 +143,8 @@ HWY_ATTR void finish_hits(const core::RayStream& rays, std::size_t begin, std::s
         const auto store = [&](Floats value, core::Column<float>& column) HWY_ATTR {
             hn::Store(hn::IfThenElseZero(found_float, value), kFloat, column.data() + at);
         };
-        hn::Store(hn::IfThenElse(found_float, t, hn::Set(kFloat, std::numeric_limits<float>::infinity())), kFloat,
-                  &hits.t[at]);
+        hn::Store(hn::IfThenElse(found_float, t, hn::Set(kFloat, std::numeric_limits<float>::infinity())),
+                  kFloat, &hits.t[at]);
         store(normal.x, hits.normal_x);
         store(normal.y, hits.normal_y);
         store(normal.z, hits.normal_z);

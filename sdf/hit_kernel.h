@@ -39,8 +39,9 @@ struct HitPlacement {
 /// How far beyond a right angle the normals of finish_hits() face their rays.
 inline constexpr float kFacing = 1e-6f;
 
-/// Writes hits and misses of rays begin to begin + count - 1; where has_field_normal() is false, the normal is
-/// for the caller to write. Normals face their rays. `steps` is left alone. Same bits on every instruction set.
+/// Writes hits and misses of rays begin to begin + count - 1; where has_field_normal() is false, the normal
+/// is for the caller to write. Normals face their rays. `steps` is left alone. Same bits on every instruction
+/// set.
 /// @param nearest of ray `begin`; those of the others follow in steps of `stride` bytes
 /// @pre begin is a multiple of core::kStreamLanes, stride of 4
 void finish_hits(const core::RayStream& rays, std::size_t begin, std::size_t count, const NearestHit* nearest,

@@ -87,7 +87,8 @@ bool SdfTracer::meet_triangle(LocalRay& ray, double t_min, double t_max, Nearest
     return false;
 }
 
-bool SdfTracer::accept(LocalRay& ray, const Crossing& crossing, const Surface& here, NearestHit& found) const {
+bool SdfTracer::accept(LocalRay& ray, const Crossing& crossing, const Surface& here,
+                       NearestHit& found) const {
     ray.come_to = crossing.t;
     ray.is_inside = crossing.enters_negative;
     // The ray was inside a shell, or inside a solid that a shell runs into.

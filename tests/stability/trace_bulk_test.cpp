@@ -163,7 +163,7 @@ TEST(Case35, NoRayLeavesASealedRoom) {
                         far += off > 0.5 * thickness * h;
                     }
                     // A ray that cuts the corner of a wall within one cell has no change of sign over it.
-                    const std::size_t allowed = way.mode == sdf::HitMode::kSecant ? rays.size() / 2000 : 0;
+                    const std::size_t allowed = way.is_cubic() ? 0 : rays.size() / 2000;
                     EXPECT_LE(escapes, allowed)
                         << way << ", thickness " << thickness << (is_turned ? ", turned" : "");
                     if (escapes > 0 && std::getenv("FIELDLIGHT_FIGURES")) {
