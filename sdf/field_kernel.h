@@ -36,8 +36,11 @@ inline constexpr int kBrickBits = 21;
 
 /// What an occupied cell knows besides its samples.
 struct alignas(64) CellSurface {
-    std::int32_t gradient[8];  ///< At the corners, corner 4 x + 2 y + z; see stored_gradient().
-    std::int32_t triangle[8];  ///< The distinct ones that the corners name, ascending; the rest -1.
+    /// At the corners, corner 4 x + 2 y + z: stored_gradient(), and in the two lowest bits the stored_gap()
+    /// between the cell and the triangle of the same place.
+    std::int32_t gradient[8];
+    /// The distinct ones that the corners name, by their gaps and then ascending; the rest -1.
+    std::int32_t triangle[8];
 };
 
 /// The occupied cells of a brick.

@@ -21,33 +21,72 @@ int occupied_count(const Brick& brick) {
     return count;
 }
 
+/// A lower bound of the distance between a triangle and a cell: the widest gap along any of the axes that
+/// could part them (Gottschalk et al., "OBBTree", 1996).
+double gap_between(const VoxelTriangle& triangle, const glm::dvec3& cell_middle) {
+    const auto vector = [](const float(&v)[3]) { return glm::dvec3(v[0], v[1], v[2]); };
+    const glm::dvec3 ab = vector(triangle.ab), ac = vector(triangle.ac), a = vector(triangle.a) - cell_middle;
+    const glm::dvec3 b = a + ab, c = a + ac;
+    double widest = 0.0;
+    const auto try_axis = [&](const glm::dvec3& axis) {
+        const double length = glm::length(axis);
+        if (!(length > 1e-9)) return;
+        const double pa = glm::dot(axis, a), pb = glm::dot(axis, b), pc = glm::dot(axis, c);
+        const double reach = 0.5 * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
+        widest = std::max(widest,
+                          std::max(std::min({pa, pb, pc}) - reach, -reach - std::max({pa, pb, pc})) / length);
+    };
+    try_axis(glm::cross(ab, ac));
+    for (int axis = 0; axis < 3; ++axis) {
+        glm::dvec3 unit(0.0);
+        unit[axis] = 1.0;
+        try_axis(unit);
+        for (const glm::dvec3& side : {ab, ac, ac - ab}) try_axis(glm::cross(unit, side));
+    }
+    return widest;
+}
+
 /// What the brick's cells know, from `to` on in the order of its mask.
-/// @param triangle_base of the field, over all fields
+/// @param triangles of all fields; @param triangle_base where those of this one begin
 void copy_cells(const BrickGrid& grid, const glm::ivec3& block, const Brick& brick,
-                std::int32_t triangle_base, CellSurface* to) {
+                std::span<const VoxelTriangle> triangles, std::int32_t triangle_base, CellSurface* to) {
     // Neighbours share corners.
     constexpr std::int32_t kUnknown = -1;  // No gradient is stored so: its lowest bits are 0.
     std::array<std::int32_t, kBrickSize> gradients;
     gradients.fill(kUnknown);
+    struct Candidate {
+        int apart;
+        std::int32_t triangle;
+        auto operator<=>(const Candidate&) const = default;
+    };
     for (int i = 0; i < kBrickCells * kBrickCells * kBrickCells; ++i) {
         const glm::ivec3 cell(i / 49, i / 7 % 7, i % 7);
         if (!brick.is_occupied(cell.x, cell.y, cell.z)) continue;
-        std::fill(std::begin(to->triangle), std::end(to->triangle), -1);
-        std::int32_t* end = to->triangle;
+        const glm::dvec3 middle = glm::dvec3(block * kBrickCells + cell) + 0.5;
+        std::array<Candidate, 8> candidates;
+        std::size_t count = 0;
         for (int corner = 0; corner < 8; ++corner) {
             const int sample =
                 Brick::index(cell.x + (corner >> 2), cell.y + (corner >> 1 & 1), cell.z + (corner & 1));
             std::int32_t& gradient = gradients[static_cast<std::size_t>(sample)];
             if (gradient == kUnknown) gradient = stored_gradient(lattice_gradient(grid, block, sample));
             to->gradient[corner] = gradient;
+            to->triangle[corner] = -1;
             const std::uint32_t triangle = grid.triangle(brick, sample);
             if (triangle == kNoTriangle) continue;
             const std::int32_t number = static_cast<std::int32_t>(triangle) + triangle_base;
-            std::int32_t* place = std::lower_bound(to->triangle, end, number);
-            if (place != end && *place == number) continue;
-            std::copy_backward(place, end, end + 1);
-            *place = number;
-            ++end;
+            const auto has_number = [number](const Candidate& other) { return other.triangle == number; };
+            const auto end = candidates.begin() + static_cast<std::ptrdiff_t>(count);
+            if (std::any_of(candidates.begin(), end, has_number)) continue;
+            const double gap = gap_between(triangles[static_cast<std::size_t>(number)], middle);
+            candidates[count++] = {stored_gap(gap), number};
+        }
+        for (std::size_t k = 0; k < count; ++k) {
+            const auto rest = candidates.begin() + static_cast<std::ptrdiff_t>(k);
+            std::iter_swap(rest,
+                           std::min_element(rest, candidates.begin() + static_cast<std::ptrdiff_t>(count)));
+            to->triangle[k] = candidates[k].triangle;
+            to->gradient[k] |= candidates[k].apart;
         }
         ++to;
     }
@@ -120,6 +159,21 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
 }
 
 void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const Place& place) {
+    core::parallel_for(mesh.triangles.size(), 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const glm::uvec3& corner = mesh.triangles[i];
+            const auto voxel = [&](std::uint32_t vertex) {
+                return (glm::dvec3(mesh.positions[vertex]) - grid.origin()) / grid.voxel_size();
+            };
+            const glm::dvec3 a = voxel(corner.x), ab = voxel(corner.y) - a, ac = voxel(corner.z) - a;
+            VoxelTriangle& triangle = triangles_[static_cast<std::size_t>(place.triangle_base) + i];
+            for (int axis = 0; axis < 3; ++axis) {
+                triangle.a[axis] = static_cast<float>(a[axis]);
+                triangle.ab[axis] = static_cast<float>(ab[axis]);
+                triangle.ac[axis] = static_cast<float>(ac[axis]);
+            }
+        }
+    });
     const SkipBoxes skip(grid);
     std::transform(skip.top.begin(), skip.top.end(), top_.begin() + place.top_base,
                    [&](std::int32_t entry) { return entry < 0 ? entry : entry + place.brick_base; });
@@ -141,23 +195,8 @@ void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const 
             std::copy(brick.sample.begin(), brick.sample.end(), samples_.begin() + first);
             const auto at = static_cast<int>(i);
             const glm::ivec3 block(at / (count.y * count.z), at / count.z % count.y, at % count.z);
-            copy_cells(grid, block, brick, place.triangle_base,
+            copy_cells(grid, block, brick, triangles_, place.triangle_base,
                        &cells_[static_cast<std::size_t>(bricks_[number].first)]);
-        }
-    });
-    core::parallel_for(mesh.triangles.size(), 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const glm::uvec3& corner = mesh.triangles[i];
-            const auto voxel = [&](std::uint32_t vertex) {
-                return (glm::dvec3(mesh.positions[vertex]) - grid.origin()) / grid.voxel_size();
-            };
-            const glm::dvec3 a = voxel(corner.x), ab = voxel(corner.y) - a, ac = voxel(corner.z) - a;
-            VoxelTriangle& triangle = triangles_[static_cast<std::size_t>(place.triangle_base) + i];
-            for (int axis = 0; axis < 3; ++axis) {
-                triangle.a[axis] = static_cast<float>(a[axis]);
-                triangle.ab[axis] = static_cast<float>(ab[axis]);
-                triangle.ac[axis] = static_cast<float>(ac[axis]);
-            }
         }
     });
 }

@@ -123,15 +123,31 @@ struct TriangleLanes {
     }
 };
 
+/// Less than the squared distance of any triangle with a gap of the given number; rounding kept back.
+HWY_INLINE HWY_ATTR Floats least_squared(Ints gap) {
+    constexpr float kPart = 0.999f;
+    const auto squared = [](float voxels) { return kPart * voxels * voxels; };
+    const auto at_least = [&](int number) HWY_ATTR {
+        return hn::RebindMask(kFloat, hn::Gt(gap, hn::Set(kInt, number - 1)));
+    };
+    Floats least = hn::Set(kFloat, -1.0f);
+    for (int number = 1; number < 4; ++number) {
+        least = hn::IfThenElse(at_least(number),
+                               hn::Set(kFloat, squared(kGaps[static_cast<std::size_t>(number)])), least);
+    }
+    return least;
+}
+
 /// Measures the triangles of the given place in the cells' lists, and keeps those that are nearer than the
-/// ones before: of equally close ones the first stays. @param open crossings whose lists are so long; returns
-/// with those that are longer
+/// ones before; of equally close ones the lowest number. @param open crossings that look at that place, then
+/// those that must look at the next
 template <bool kFirst>
 HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, SurfacePoints& points, int place,
                                                   std::int32_t* open, std::size_t count) {
-    const Ints none = hn::Set(kInt, -1), zero = hn::Zero(kInt);
-    const auto* lists = reinterpret_cast<const std::int32_t*>(table.cells) + 8 + place;
-    std::size_t longer = 0;
+    const Ints zero = hn::Zero(kInt);
+    const auto* gradients = reinterpret_cast<const std::int32_t*>(table.cells) + place;
+    const auto* lists = gradients + 8;
+    std::size_t going_on = 0;
     for (std::size_t i = 0; i < count; i += hn::Lanes(kFloat)) {
         Ints point;
         if constexpr (kFirst) {
@@ -147,41 +163,49 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
         };
         const Ints first = of_point(kInt, points.cell) * hn::Set(kInt, kCellWords);
         const Ints number = hn::GatherIndex(kInt, lists, first);
-        const Ints next = place < 7 ? hn::GatherIndex(kInt, lists + 1, first) : none;
         const auto is_named = hn::Not(hn::Lt(number, zero));
         const TriangleLanes triangle(table, hn::Max(number, zero));
         const Vector from{of_point(kFloat, points.x) - triangle.a.x,
                           of_point(kFloat, points.y) - triangle.a.y,
                           of_point(kFloat, points.z) - triangle.a.z};
         const ClosestLanes found = closest_on_triangles(from, triangle.ab, triangle.ac);
+        Floats best;
         if constexpr (kFirst) {
+            best = hn::IfThenElse(hn::RebindMask(kFloat, is_named), found.squared, hn::Set(kFloat, 1e30f));
             hn::Store(number, kInt, &points.triangle[i]);
-            hn::Store(hn::IfThenElse(hn::RebindMask(kFloat, is_named), found.squared, hn::Set(kFloat, 1e30f)),
-                      kFloat, &points.distance_squared[i]);
+            hn::Store(best, kFloat, &points.distance_squared[i]);
             hn::Store(found.u, kFloat, &points.u[i]);
             hn::Store(found.v, kFloat, &points.v[i]);
         } else {
-            const Floats best = of_point(kFloat, points.distance_squared);
-            const auto nearer = hn::And(hn::RebindMask(kFloat, is_named), hn::Lt(found.squared, best));
+            best = of_point(kFloat, points.distance_squared);
+            const Ints best_number = of_point(kInt, points.triangle);
+            const auto is_lower = hn::RebindMask(kFloat, hn::Lt(number, best_number));
+            const auto nearer =
+                hn::And(hn::RebindMask(kFloat, is_named),
+                        hn::Or(hn::Lt(found.squared, best), hn::And(hn::Eq(found.squared, best), is_lower)));
             if (!hn::AllFalse(kFloat, nearer)) {
+                best = hn::IfThenElse(nearer, found.squared, best);
+                hn::ScatterIndex(best, kFloat, points.distance_squared.data(), point);
                 const auto keep = [&](Floats value, core::Column<float>& column) HWY_ATTR {
                     hn::ScatterIndex(hn::IfThenElse(nearer, value, of_point(kFloat, column)), kFloat,
                                      column.data(), point);
                 };
-                keep(found.squared, points.distance_squared);
                 keep(found.u, points.u);
                 keep(found.v, points.v);
-                hn::ScatterIndex(
-                    hn::IfThenElse(hn::RebindMask(kInt, nearer), number, of_point(kInt, points.triangle)),
-                    kInt, points.triangle.data(), point);
+                hn::ScatterIndex(hn::IfThenElse(hn::RebindMask(kInt, nearer), number, best_number), kInt,
+                                 points.triangle.data(), point);
             }
         }
+        if (place == 7) continue;
         // Where the last vector is not full, its lanes beyond the end name nothing.
-        const auto goes_on = hn::Not(hn::Lt(next, zero));
-        hn::StoreU(hn::Compress(point, goes_on), kInt, open + longer);
-        longer += hn::CountTrue(kInt, goes_on);
+        const Ints next = hn::GatherIndex(kInt, lists + 1, first);
+        const Ints gap = hn::And(hn::GatherIndex(kInt, gradients + 1, first), hn::Set(kInt, 3));
+        const auto goes_on =
+            hn::And(hn::Not(hn::Lt(next, zero)), hn::RebindMask(kInt, hn::Gt(best, least_squared(gap))));
+        hn::StoreU(hn::Compress(point, goes_on), kInt, open + going_on);
+        going_on += hn::CountTrue(kInt, goes_on);
     }
-    return longer;
+    return going_on;
 }
 
 HWY_INLINE HWY_ATTR void find_sides(const SurfaceTable& table, SurfacePoints& points) {
@@ -228,6 +252,12 @@ HWY_EXPORT(find_surface);
 
 void find_surface(const SurfaceTable& table, SurfacePoints& points) {
     HWY_DYNAMIC_DISPATCH(find_surface)(table, points);
+}
+
+int stored_gap(double voxels) {
+    int number = 0;
+    while (number < 3 && voxels >= static_cast<double>(kGaps[static_cast<std::size_t>(number) + 1])) ++number;
+    return number;
 }
 
 std::int32_t stored_gradient(const glm::dvec3& gradient) {

@@ -2,6 +2,7 @@
 // for many crossings at once.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -25,6 +26,12 @@ struct VoxelTriangle {
 /// A gradient of the field in one word: three components of 10 bits, in steps of kGradientStep.
 inline constexpr float kGradientStep = 1.0f / 400.0f;
 std::int32_t stored_gradient(const glm::dvec3& gradient);
+
+/// Distances in voxels that a gap may be known to have at least. A triangle that lies so far off its cell
+/// need not be looked at where another is nearer.
+inline constexpr std::array<float, 4> kGaps = {0.0f, 0.0625f, 0.25f, 0.5f};
+/// The largest of kGaps that a gap has, by its number.
+int stored_gap(double voxels);
 
 /// Where the surface of all fields is kept; triangles are numbered over all of them.
 struct SurfaceTable {
