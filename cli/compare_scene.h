@@ -23,8 +23,9 @@ struct CompareSceneOptions {
     int bounces = -1;                               ///< -1: no limit.
     std::vector<int> resolutions = {64, 128, 256};  ///< Voxels on the longest side; ascending, none twice.
     sdf::HitMode hit_mode = sdf::HitMode::kCubic;   ///< Of all fields.
-    int max_samples = 64;                           ///< The ladder's last rung; powers of two before it.
-    int reference_samples = 1024;                   ///< At least 8, one a batch of the variance.
+    sdf::SampleBits sample_bits = sdf::SampleBits::k16;
+    int max_samples = 64;              ///< The ladder's last rung; powers of two before it.
+    int reference_samples = 1024;      ///< At least 8, one a batch of the variance.
     double time_budget_seconds = 0.0;  ///< Ends the ladder before a rung that would pass it; 0: no limit.
 };
 

@@ -35,6 +35,7 @@ void CompareSceneFlags::add_to(CLI::App& verb) {
         ->check(CLI::Range(4, sdf::kMostVoxelsAlongSide))
         ->capture_default_str();
     add_hit_mode_option(verb, options_.hit_mode);
+    add_sample_bits_option(verb, options_.sample_bits);
     verb.add_option("--max-spp", options_.max_samples,
                     "The ladder is 1, 2, 4, ... samples a pixel up to this")
         ->check(CLI::Range(1, 1 << 20))

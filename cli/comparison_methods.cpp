@@ -87,6 +87,7 @@ Method fields(const Program& program, const CompareSceneOptions& options, const 
     Method method;
     method.render = render_options(options, TracerKind::kSdf);
     method.render.bake.resolution = resolution;
+    method.render.bake.sample_bits = options.sample_bits;
     method.render.hit_mode = options.hit_mode;
     const fs::path folder = options.bake_folder.empty() ? options.folder / "fields" : options.bake_folder;
     method.render.bake_folder = folder / std::to_string(resolution);

@@ -111,6 +111,7 @@ void add_render_command(CLI::App& app, Program& program) {
         ->transform(CLI::CheckedTransformer(tracers).description(""))
         ->type_name("KIND");
     add_hit_mode_option(*verb, options.hit_mode);
+    add_sample_bits_option(*verb, options.bake.sample_bits);
     verb->add_option("--renderer", flags->renderer, "path: the path tracer")
         ->check(CLI::IsMember({"path", "gather", "irradiance-field", "screen-denoiser", "direct"})
                     .description(""))

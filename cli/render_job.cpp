@@ -34,30 +34,33 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
     const double pixel_count = static_cast<double>(frame.image.pixel_count());
     std::string command = "fieldlight";
     for (const std::string& argument : program.arguments) command += " " + argument;
-    return {{"schema", 1},
-            {"version", FIELDLIGHT_VERSION},
-            {"command", command},
-            {"scene", options.scene.file.string()},
-            {"width", frame.image.width()},
-            {"height", frame.image.height()},
-            {"tracer", name_of(options.tracer)},
-            {"primary", name_of(options.primary)},
-            {"hit_mode",
-             traces_fields(options) ? nlohmann::json(name_of(options.hit_mode)) : nlohmann::json(nullptr)},
-            {"renderer", "path"},
-            {"threads", core::thread_limit()},
-            {"isa", instruction_set()},
-            {"samples_per_pixel", frame.samples_per_pixel},
-            {"passes", passes},
-            {"rays", frame.rays},
-            {"rays_per_pixel", static_cast<double>(frame.rays) / pixel_count},
-            {"sdf", {{"rays", fields.rays}, {"steps", fields.steps}, {"exhausted", fields.exhausted}}},
-            {"memory",
-             {{"peak_bytes", peak_memory_bytes()},
-              {"sdf_bytes", tracers.sdf ? tracers.sdf->bytes() : 0},
-              {"triangle_bytes", tracers.triangle ? tracers.triangle->bytes() : 0},
-              {"probe_bytes", 0}}},
-            {"nonfinite_pixels", 0}};
+    return {
+        {"schema", 1},
+        {"version", FIELDLIGHT_VERSION},
+        {"command", command},
+        {"scene", options.scene.file.string()},
+        {"width", frame.image.width()},
+        {"height", frame.image.height()},
+        {"tracer", name_of(options.tracer)},
+        {"primary", name_of(options.primary)},
+        {"hit_mode",
+         traces_fields(options) ? nlohmann::json(name_of(options.hit_mode)) : nlohmann::json(nullptr)},
+        {"sample_bits", traces_fields(options) ? nlohmann::json(static_cast<int>(options.bake.sample_bits))
+                                               : nlohmann::json(nullptr)},
+        {"renderer", "path"},
+        {"threads", core::thread_limit()},
+        {"isa", instruction_set()},
+        {"samples_per_pixel", frame.samples_per_pixel},
+        {"passes", passes},
+        {"rays", frame.rays},
+        {"rays_per_pixel", static_cast<double>(frame.rays) / pixel_count},
+        {"sdf", {{"rays", fields.rays}, {"steps", fields.steps}, {"exhausted", fields.exhausted}}},
+        {"memory",
+         {{"peak_bytes", peak_memory_bytes()},
+          {"sdf_bytes", tracers.sdf ? tracers.sdf->bytes() : 0},
+          {"triangle_bytes", tracers.triangle ? tracers.triangle->bytes() : 0},
+          {"probe_bytes", 0}}},
+        {"nonfinite_pixels", 0}};
 }
 
 }  // namespace
@@ -106,6 +109,7 @@ core::ExrAttributes picture_attributes(const RenderOptions& options, const core:
     attributes["sun"] = options.scene.sun.empty() ? std::string("none") : options.scene.sun;
     if (traces_fields(options)) {
         attributes["hitMode"] = std::string(name_of(options.hit_mode));
+        attributes["sampleBits"] = std::to_string(static_cast<int>(options.bake.sample_bits));
         attributes["voxels"] = options.bake.voxel_world
                                    ? fmt::format("{} world units", *options.bake.voxel_world)
                                    : fmt::format("{} on the longest side", options.bake.resolution);

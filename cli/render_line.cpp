@@ -49,7 +49,8 @@ std::string render_line(const RenderOptions& options, bool allow_external) {
         "--tracer", name_of(options.tracer),     "--primary", name_of(options.primary)};
     if (traces_fields(options)) {
         line.insert(line.end(),
-                    {"--hit-mode", name_of(options.hit_mode), "--resolution",
+                    {"--hit-mode", name_of(options.hit_mode), "--sample-bits",
+                     std::to_string(static_cast<int>(options.bake.sample_bits)), "--resolution",
                      std::to_string(options.bake.resolution), "--bake-dir", options.bake_folder.string()});
     }
     line.insert(line.end(), {"--size", fmt::format("{}x{}", options.width, options.height), "--spp",

@@ -25,6 +25,9 @@ const char* name_of(sdf::HitMode mode);
 /// Declares --hit-mode; its help says what each mode costs and gives.
 void add_hit_mode_option(CLI::App& verb, sdf::HitMode& mode);
 
+/// Declares --sample-bits; its help says what fewer cost and give.
+void add_sample_bits_option(CLI::App& verb, sdf::SampleBits& bits);
+
 /// The tracers that a picture needs, and no others. The scene must outlive them.
 struct SceneTracers {
     std::unique_ptr<core::TriangleTracer> triangle;

@@ -106,7 +106,7 @@ BakedGrid bake_within_limits(const core::Mesh& mesh, double voxel, double longes
                                           coarsened, voxel, longest_side / voxel);
         }
         info.warnings.insert(info.warnings.begin(), warnings.begin(), warnings.end());
-        baked.grid = std::make_shared<const BrickGrid>(baked.field);
+        baked.grid = std::make_shared<const BrickGrid>(baked.field, settings.sample_bits);
         const FieldMemory memory = field_memory(*baked.grid, mesh.triangles.size());
         if (limit == 0 || memory.total() <= limit) return baked;
         if (attempt == kMostCoarsenings || memory.triangles >= limit) {
@@ -132,11 +132,11 @@ BakedGrid bake_within_limits(const core::Mesh& mesh, double voxel, double longes
 }
 
 /// Takes an earlier bake if it fits; says why in `warnings` if the file cannot be read at all.
-std::shared_ptr<const BrickGrid> reuse(const fs::path& file, const BakeKey& key,
+std::shared_ptr<const BrickGrid> reuse(const fs::path& file, const BakeKey& key, SampleBits bits,
                                        std::vector<std::string>& warnings) {
     try {
         if (!fs::exists(file) || read_bake_key(file) != key) return nullptr;
-        return std::make_shared<const BrickGrid>(read_field(file));
+        return std::make_shared<const BrickGrid>(read_field(file), bits);
     } catch (const core::InputError& error) {
         warnings.push_back(fmt::format("an earlier bake is of no use and was replaced: {}", error.what()));
         return nullptr;
@@ -159,7 +159,7 @@ void bake_one(const core::Scene& scene, const BakeSettings& settings, const fs::
     const BakeKey key{source_hash(mesh), settings_hash(voxel, settings)};
     if (!folder.empty()) {
         bake.file = folder / file_name(mesh, bake.mesh);
-        if (!settings.force) bake.grid = reuse(bake.file, key, bake.warnings);
+        if (!settings.force) bake.grid = reuse(bake.file, key, settings.sample_bits, bake.warnings);
         bake.reused = bake.grid != nullptr;
     }
     if (!bake.reused) {

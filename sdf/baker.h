@@ -27,6 +27,8 @@ struct BakeSettings {
     /// No mesh gets a field that takes more bytes than this in a tracer (see FieldMemory); coarser with a
     /// warning instead. 0: no limit.
     std::uint64_t max_field_bytes = 0;
+    /// Of the fields in memory; files keep every bit.
+    SampleBits sample_bits = SampleBits::k16;
     ClassOverride surface_class = ClassOverride::kAuto;
     /// Only the mesh of this name; empty: all.
     std::string only_mesh;

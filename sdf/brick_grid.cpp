@@ -58,8 +58,9 @@ CellBox occupied_box(const Brick& brick) {
 }
 
 /// Gives samples that the band does not hold the sign of their neighbours, in waves from those it holds.
-void fill_unknown(std::array<std::int16_t, kBrickSize>& sample, std::bitset<kBrickSize> is_known) {
-    constexpr std::int16_t kFarthest = 32767;
+/// @param farthest sample that there is
+void fill_unknown(std::array<std::int16_t, kBrickSize>& sample, std::bitset<kBrickSize> is_known,
+                  std::int16_t farthest) {
     constexpr int kStride[] = {64, 8, 1};
     while (!is_known.all() && is_known.any()) {
         std::bitset<kBrickSize> reached = is_known;
@@ -73,7 +74,7 @@ void fill_unknown(std::array<std::int16_t, kBrickSize>& sample, std::bitset<kBri
                 const auto neighbor = static_cast<std::size_t>(i + step * kStride[axis]);
                 if (!is_known[neighbor]) continue;
                 sample[static_cast<std::size_t>(i)] =
-                    sample[neighbor] < 0 ? static_cast<std::int16_t>(-kFarthest) : kFarthest;
+                    sample[neighbor] < 0 ? static_cast<std::int16_t>(-farthest) : farthest;
                 reached[static_cast<std::size_t>(i)] = true;
                 break;
             }
@@ -91,17 +92,22 @@ std::int64_t gap_squared(int offset) {
 
 }  // namespace
 
-std::int16_t stored_sample(float voxels) {
-    const float steps = std::clamp(std::round(voxels / kSampleStepVoxels), -32767.0f, 32767.0f);
-    const auto stored = static_cast<std::int16_t>(steps);
-    return voxels < 0.0f && stored == 0 ? std::int16_t{-1} : stored;
+std::int16_t stored_sample(float voxels, SampleBits bits) {
+    const int unit = bits == SampleBits::k8 ? kCoarseSteps : 1;
+    const auto most = static_cast<float>(32767 / unit);
+    const float steps =
+        std::clamp(std::round(voxels / (kSampleStepVoxels * static_cast<float>(unit))), -most, most);
+    const auto stored = static_cast<int>(steps);
+    return static_cast<std::int16_t>(voxels < 0.0f && stored == 0 ? -unit : stored * unit);
 }
 
-BrickGrid::BrickGrid(const SampledField& field) : info_(field.info), features_(field.features) {
+BrickGrid::BrickGrid(const SampledField& field, SampleBits bits)
+    : info_(field.info), bits_(bits), features_(field.features) {
     const LeafMap map(field.leaves);
     std::vector<LeafMask> occupied(field.leaves.size());
-    const auto zero_below =
-        static_cast<float>(0.5 * static_cast<double>(kSampleStepVoxels) * field.info.voxel_size);
+    const double step_voxels =
+        static_cast<double>(kSampleStepVoxels) * (bits == SampleBits::k8 ? kCoarseSteps : 1);
+    const auto zero_below = static_cast<float>(0.5 * step_voxels * field.info.voxel_size);
     core::parallel_for(field.leaves.size(), 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
             occupied[i] = occupied_cells(map, field.leaves[i], zero_below);
@@ -174,7 +180,7 @@ void BrickGrid::fill_brick(const LeafMap& map, const glm::ivec3& first_sample, B
         is_known[at] = leaf && leaf->is_active(static_cast<int>(slot));
         triangles[at] = kUnknown;
         if (!is_known[at]) continue;
-        brick.sample[at] = stored_sample(static_cast<float>(leaf->distance[slot] / info_.voxel_size));
+        brick.sample[at] = stored_sample(static_cast<float>(leaf->distance[slot] / info_.voxel_size), bits_);
         if (leaf->triangle[slot] < 0) continue;
         triangles[at] = static_cast<std::uint32_t>(leaf->triangle[slot]);
         palette.push_back(triangles[at]);
@@ -186,7 +192,7 @@ void BrickGrid::fill_brick(const LeafMap& map, const glm::ivec3& first_sample, B
         brick.palette_entry[i] =
             triangles[i] == kUnknown ? kNoPaletteEntry : static_cast<std::uint16_t>(entry - palette.begin());
     }
-    fill_unknown(brick.sample, is_known);
+    fill_unknown(brick.sample, is_known, stored_sample(kBandVoxels, bits_));
 }
 
 void BrickGrid::fill_empty_distances() {

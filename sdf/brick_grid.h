@@ -35,9 +35,18 @@ inline constexpr int kBrickSize = kBrickSamples * kBrickSamples * kBrickSamples;
 /// Samples are stored in steps of this many voxels, +-32767 of them: as far as the band reaches.
 inline constexpr float kSampleStepVoxels = kBandVoxels / 32767.0f;
 
-/// The stored form of a distance in voxels: the nearest step, save that no value changes its sign. (0 counts
-/// as positive.)
-std::int16_t stored_sample(float voxels);
+/// How finely samples are stored.
+enum class SampleBits : std::uint8_t {
+    k8 = 8,    ///< Only every kCoarseSteps-th step: 0.03 voxel.
+    k16 = 16,  ///< Every step: 1e-4 voxel.
+};
+
+/// Steps from one 8-bit sample to the next: 127 of them reach as far as the band.
+inline constexpr int kCoarseSteps = 258;
+
+/// The stored form of a distance in voxels, in steps of kSampleStepVoxels: the nearest that there is, save
+/// that no value changes its sign. (0 counts as positive.)
+std::int16_t stored_sample(float voxels, SampleBits bits = SampleBits::k16);
 
 /// 8^3 samples in steps of kSampleStepVoxels, negative inside; x runs slowest, z fastest. Where the band
 /// holds nothing the sample is the farthest one of its neighbours' sign, so that it makes no crossing.
@@ -61,9 +70,10 @@ struct Brick {
 class BrickGrid {
 public:
     /// Lays out a baked field.
-    explicit BrickGrid(const SampledField& field);
+    explicit BrickGrid(const SampledField& field, SampleBits bits = SampleBits::k16);
 
     const FieldInfo& info() const { return info_; }
+    SampleBits sample_bits() const { return bits_; }
     double voxel_size() const { return info_.voxel_size; }
     /// Local position of voxel coordinate (0, 0, 0).
     const glm::dvec3& origin() const { return origin_; }
@@ -128,6 +138,7 @@ private:
     double distance_to_near_cells(const glm::ivec3& block, const std::vector<CellBox>& boxes) const;
 
     FieldInfo info_;
+    SampleBits bits_;
     glm::dvec3 origin_{0.0};
     glm::ivec3 block_count_{0};
     core::DoubleBounds traced_voxels_;

@@ -80,10 +80,21 @@ struct Candidates {
 HWY_INLINE HWY_ATTR Corners load_corners(const FieldTable& fields, Ints brick, Floats in_brick) {
     const Ints offset =
         hn::ShiftLeft<kLogBrickBytes>(brick) + hn::ShiftLeft<1>(hn::ConvertTo(kInt, in_brick));
-    // Two samples along z in a word.
     const auto* base = reinterpret_cast<const std::int32_t*>(fields.samples);
     const auto words = [&](int bytes)
                            HWY_ATTR { return hn::GatherOffset(kInt, base, offset + hn::Set(kInt, bytes)); };
+    if (fields.bits == SampleBits::k8) {
+        // Two samples along y, and the same two one further along z.
+        const Ints near = words(0), far = words(kSampleBytesX);
+        const Floats unit = hn::Set(kFloat, kCoarseSteps);
+        const auto shifted = [&](Ints word)
+                                 HWY_ATTR { return hn::ConvertTo(kFloat, hn::ShiftRight<24>(word)) * unit; };
+        return {shifted(hn::ShiftLeft<24>(near)), shifted(hn::ShiftLeft<8>(near)),
+                shifted(hn::ShiftLeft<16>(near)), shifted(near),
+                shifted(hn::ShiftLeft<24>(far)),  shifted(hn::ShiftLeft<8>(far)),
+                shifted(hn::ShiftLeft<16>(far)),  shifted(far)};
+    }
+    // Two samples along z in a word.
     const Ints w00 = words(0), w01 = words(kSampleBytesY), w10 = words(kSampleBytesX),
                w11 = words(kSampleBytesX + kSampleBytesY);
     const auto low_half = [](Ints word) HWY_ATTR {

@@ -68,7 +68,10 @@ struct FieldTable {
     const std::uint32_t* boxes = nullptr;  ///< As SkipBoxes::boxes.
     const BrickCells* bricks = nullptr;    ///< What surface of each brick is stored where.
     const CellSurface* cells = nullptr;
-    const std::int16_t* samples = nullptr;  ///< kBrickSize a brick, as in Brick, and one more in all.
+    /// kBrickSize a brick, as in Brick, and one more in all. Of 8 bits, in units of kCoarseSteps, a pair
+    /// each: the sample in the lower half, its neighbour along y in the upper.
+    const std::int16_t* samples = nullptr;
+    SampleBits bits = SampleBits::k16;
 };
 
 /// A ray in the voxels of one field, and where that field lies in the table.

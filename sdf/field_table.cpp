@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cmath>
 
 #include "core/support/error.h"
@@ -92,6 +93,22 @@ void copy_cells(const BrickGrid& grid, const glm::ivec3& block, const Brick& bri
     }
 }
 
+/// A brick's samples as FieldTable has them.
+void copy_samples(const Brick& brick, SampleBits bits, std::vector<std::int16_t>::iterator to) {
+    if (bits == SampleBits::k16) {
+        std::copy(brick.sample.begin(), brick.sample.end(), to);
+        return;
+    }
+    constexpr int kAlongY = 8;
+    for (int i = 0; i < kBrickSize; ++i) {
+        const bool has_neighbor = i / kAlongY % kBrickSamples < kBrickCells;
+        const int here = brick.sample[static_cast<std::size_t>(i)] / kCoarseSteps;
+        const int above =
+            has_neighbor ? brick.sample[static_cast<std::size_t>(i + kAlongY)] / kCoarseSteps : 0;
+        *to++ = static_cast<std::int16_t>((here & 0xff) | above * 256);
+    }
+}
+
 BrickCells brick_cells(const Brick& brick, std::size_t first) {
     BrickCells cells;
     cells.occupied = brick.occupied;
@@ -122,6 +139,8 @@ FieldAtlas::FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids,
     for (std::size_t i = 0; i < grids.size(); ++i) {
         if (is_empty(i)) continue;
         const BrickGrid& grid = *grids[i];
+        assert(brick_count == 0 || grid.sample_bits() == bits_);
+        bits_ = grid.sample_bits();
         Place& place = places_[i];
         place.top_base = static_cast<std::int32_t>(top_size);
         place.brick_base = static_cast<std::int32_t>(brick_count);
@@ -192,7 +211,7 @@ void FieldAtlas::copy_grid(const BrickGrid& grid, const core::Mesh& mesh, const 
             const Brick& brick = grid.brick_at(grid.top()[i]);
             const auto number = static_cast<std::size_t>(place.brick_base + grid.top()[i]);
             const auto first = static_cast<std::ptrdiff_t>(number * kBrickSize);
-            std::copy(brick.sample.begin(), brick.sample.end(), samples_.begin() + first);
+            copy_samples(brick, bits_, samples_.begin() + first);
             const auto at = static_cast<int>(i);
             const glm::ivec3 block(at / (count.y * count.z), at / count.z % count.y, at % count.z);
             copy_cells(grid, block, brick, triangles_, place.triangle_base,

@@ -35,12 +35,13 @@ public:
 
     /// Copies the grids in their order; null ones and those without a surface have an empty place.
     /// @param meshes that the grids were made from, by the same index
+    /// @pre all grids have the same sample_bits()
     /// @throws core::InputError (kOutOfMemory) past kMostBricks
     FieldAtlas(std::span<const std::shared_ptr<const BrickGrid>> grids, std::span<const core::Mesh> meshes);
 
     const Place& place(std::size_t grid) const { return places_[grid]; }
     FieldTable table() const {
-        return {top_.data(), boxes_.data(), bricks_.data(), cells_.data(), samples_.data()};
+        return {top_.data(), boxes_.data(), bricks_.data(), cells_.data(), samples_.data(), bits_};
     }
     SurfaceTable surface_table() const { return {cells_.data(), triangles_.data()}; }
     /// By its number over all fields.
@@ -59,6 +60,7 @@ private:
     std::vector<std::int32_t> top_;
     std::vector<std::uint32_t> boxes_;
     std::vector<std::int16_t> samples_;
+    SampleBits bits_ = SampleBits::k16;
     std::vector<BrickCells> bricks_;
     std::vector<CellSurface> cells_;
     std::vector<VoxelTriangle> triangles_;

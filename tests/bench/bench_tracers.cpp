@@ -33,6 +33,7 @@ constexpr NamedCall kCalls[] = {{"embree1", EmbreeCall::kSingle},
                                 {"embree16", EmbreeCall::kPacket16},
                                 {"embree_stream", EmbreeCall::kStream}};
 constexpr const char* kFast = "_fast";
+constexpr const char* kCoarse = "_8bit";
 
 /// "AVX3_ZEN4" as part of a tracer's name.
 std::string suffix_of(const std::string& target) {
@@ -79,6 +80,7 @@ std::vector<std::string> bench_tracer_names() {
     for (const NamedMode& mode : kModes) {
         names.emplace_back(mode.name);
         for (const std::string& target : targets) names.push_back(mode.name + suffix_of(target));
+        names.push_back(mode.name + std::string(kCoarse));
     }
     names.emplace_back("sdf_scalar");
     for (const NamedCall& call : kCalls) {
@@ -98,15 +100,19 @@ std::string kernel_target_of(const std::string& tracer_name) {
     return {};
 }
 
+sdf::SampleBits sample_bits_of(const std::string& tracer_name) {
+    return tracer_name.ends_with(kCoarse) ? sdf::SampleBits::k8 : sdf::SampleBits::k16;
+}
+
 bool is_field_tracer(const std::string& tracer_name) {
     return tracer_name.starts_with("sdf_") || tracer_name == "openvdb";
 }
 
-BenchWorld::BenchWorld(std::shared_ptr<const BenchScene> scene, int resolution,
+BenchWorld::BenchWorld(std::shared_ptr<const BenchScene> scene, int resolution, sdf::SampleBits bits,
                        const std::filesystem::path& cache)
     : scene_(std::move(scene)),
       field_(bake(scene_->scene, resolution, cache)),
-      grids_{std::make_shared<const sdf::BrickGrid>(field_)},
+      grids_{std::make_shared<const sdf::BrickGrid>(field_, bits)},
       mesh_tree_(tree_of(scene_->scene.meshes[0])),
       triangles_(scene_->scene),
       reference_(scene_->scene, grids_) {}

@@ -21,7 +21,7 @@ namespace tests {
 
 /// Names and what they stand for:
 /// `sdf_eps`, `sdf_secant`, `sdf_cubic`: sdf::SdfTracer in that hit mode; with `_avx2` and the like, on that
-/// instruction set instead of the best one.
+/// instruction set instead of the best one; with `_8bit`, on samples of 8 bits.
 /// `sdf_scalar`: ScalarFieldTracer.
 /// `embree1`, `embree8`, `embree16`, `embree_stream`: Embree on the triangles, robust; with `_fast`, not.
 /// `openvdb`: its LevelSetRayIntersector.
@@ -33,12 +33,16 @@ std::string kernel_target_of(const std::string& tracer_name);
 /// Whether a tracer walks the field, so that it can be held against the double-precision walk of the same.
 bool is_field_tracer(const std::string& tracer_name);
 
+/// Samples of the field that a tracer walks.
+sdf::SampleBits sample_bits_of(const std::string& tracer_name);
+
 /// One scene, its field, and the tracers on both, made when they are first asked for.
 class BenchWorld {
 public:
     /// @param cache folder for baked fields, as sdf::bake_scene takes it
     /// @throws core::InputError where the field cannot be baked, or has shells: those would measure triangles
-    BenchWorld(std::shared_ptr<const BenchScene> scene, int resolution, const std::filesystem::path& cache);
+    BenchWorld(std::shared_ptr<const BenchScene> scene, int resolution, sdf::SampleBits bits,
+               const std::filesystem::path& cache);
 
     const core::Scene& scene() const { return scene_->scene; }
     const sdf::BrickGrid& grid() const { return *grids_[0]; }

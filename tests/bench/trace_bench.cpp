@@ -19,6 +19,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -54,11 +55,18 @@ public:
     tests::BenchWorld& world(const Row& row) {
         std::shared_ptr<const tests::BenchScene>& scene = scenes_[row.mesh];
         if (!scene) scene = std::make_shared<const tests::BenchScene>(tests::make_bench_scene(row.mesh));
-        std::unique_ptr<tests::BenchWorld>& world = worlds_[{row.mesh, row.resolution}];
-        if (!world) world = std::make_unique<tests::BenchWorld>(scene, row.resolution, options_.fields);
+        const sdf::SampleBits bits = tests::sample_bits_of(row.tracer);
+        std::unique_ptr<tests::BenchWorld>& world = worlds_[{row.mesh, row.resolution, bits}];
+        if (!world) {
+            world = std::make_unique<tests::BenchWorld>(scene, row.resolution, bits, options_.fields);
+        }
         return *world;
     }
-    const tests::BenchRays& rays(const Row& row) { return world(row).rays(row.rays, options_.side); }
+    /// The same for all tracers.
+    const tests::BenchRays& rays(Row row) {
+        row.tracer = "sdf_cubic";
+        return world(row).rays(row.rays, options_.side);
+    }
 
     /// @pre the row's instruction set is selected
     const tests::BenchAccuracy& accuracy(const Row& row, const core::Tracer& tracer) {
@@ -72,7 +80,7 @@ public:
 private:
     Options options_;
     std::map<std::string, std::shared_ptr<const tests::BenchScene>> scenes_;
-    std::map<std::pair<std::string, int>, std::unique_ptr<tests::BenchWorld>> worlds_;
+    std::map<std::tuple<std::string, int, sdf::SampleBits>, std::unique_ptr<tests::BenchWorld>> worlds_;
     std::map<std::string, tests::BenchAccuracy> accuracies_;
 };
 

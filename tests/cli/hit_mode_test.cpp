@@ -1,5 +1,7 @@
-// tests/cli/hit_mode_test.cpp: --hit-mode: what it changes, and where it is told.
+// tests/cli/hit_mode_test.cpp: --hit-mode and --sample-bits: what they change, and where it is told.
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 #include <algorithm>
 #include <filesystem>
@@ -72,6 +74,25 @@ TEST_F(HitModeFlag, TheHelpSaysWhatModesCostAndGive) {
         EXPECT_NE(help.find("--hit-mode"), std::string::npos) << verb;
         EXPECT_NE(help.find("0.01 voxel"), std::string::npos) << verb;
     }
+}
+
+TEST_F(HitModeFlag, SamplesOfEightBitsGiveAnotherPictureOfTheSameScene) {
+    const ProgramRun fine = render("fine.exr", {"--primary", "sdf"}),
+                     coarse = render("coarse.exr", {"--primary", "sdf", "--sample-bits", "8"});
+    ASSERT_EQ(fine.exit_code, 0) << fine.err;
+    ASSERT_EQ(coarse.exit_code, 0) << coarse.err;
+    EXPECT_EQ(nlohmann::json::parse(fine.out).at("sample_bits"), 16);
+    EXPECT_EQ(nlohmann::json::parse(coarse.out).at("sample_bits"), 8);
+    const core::ExrFile a = core::read_exr_file(path("fine.exr")),
+                        b = core::read_exr_file(path("coarse.exr"));
+    EXPECT_EQ(b.info.attributes.at("sampleBits"), "8");
+    const std::vector<float>&depth_a = *a.image.find("Depth.Z"), &depth_b = *b.image.find("Depth.Z");
+    ASSERT_EQ(depth_a.size(), depth_b.size());
+    EXPECT_NE(depth_a, depth_b);
+    std::size_t apart = 0;
+    for (std::size_t i = 0; i < depth_a.size(); ++i) apart += !(std::abs(depth_a[i] - depth_b[i]) < 0.02f);
+    EXPECT_LE(apart, depth_a.size() / 50);
+    EXPECT_EQ(render("x.exr", {"--sample-bits", "12"}).exit_code, 64);
 }
 
 TEST_F(HitModeFlag, IsOneOfComparisonsSettings) {

@@ -148,6 +148,7 @@ TEST(RenderLine, SaysAllThatDecidesThePixelsAndNoMore) {
     options.aovs = {"Steps", "Depth"};
     EXPECT_EQ(cli::render_line(options, true),
               "fieldlight render 'my room.glb' -o x.exr --tracer sdf --primary sdf --hit-mode cubic "
+              "--sample-bits 16 "
               "--resolution 32 "
               "--bake-dir fields/32 --size 64x36 --spp 4 --bounces 0 --seed 9 --scene=attic --sky=1,2,3 "
               "--sky-rotation=30.5 --sun=-10,20,3000 --eye=-1,0,0 --look-at=0,0,0 --fov=60 --aov Depth,Steps "

@@ -21,8 +21,9 @@ inline sdf::SampledField bake(const core::Mesh& mesh, int resolution,
     return sdf::bake_mesh(view, {std::max({extent.x, extent.y, extent.z}) / resolution, surface_class});
 }
 
-inline std::shared_ptr<const sdf::BrickGrid> grid_of(const core::Mesh& mesh, int resolution) {
-    return std::make_shared<const sdf::BrickGrid>(bake(mesh, resolution));
+inline std::shared_ptr<const sdf::BrickGrid> grid_of(const core::Mesh& mesh, int resolution,
+                                                     sdf::SampleBits bits = sdf::SampleBits::k16) {
+    return std::make_shared<const sdf::BrickGrid>(bake(mesh, resolution), bits);
 }
 
 /// The mesh's triangles in local units.

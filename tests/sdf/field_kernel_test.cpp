@@ -32,10 +32,11 @@ core::Mesh subject() {
     return merged(torus(1.0f, 0.3f, 48, 24), moved(box(), translation({0.4, 0.6, 0.9})));
 }
 
-class FieldKernel : public testing::Test {
+/// On samples of either size.
+class FieldKernel : public testing::TestWithParam<sdf::SampleBits> {
 protected:
     const core::Scene scene_ = scene_of(subject());
-    const std::shared_ptr<const sdf::BrickGrid> grid_ = grid_of(scene_.meshes[0], 64);
+    const std::shared_ptr<const sdf::BrickGrid> grid_ = grid_of(scene_.meshes[0], 64, GetParam());
     const std::vector<std::shared_ptr<const sdf::BrickGrid>> grids_{grid_};
     const sdf::FieldAtlas atlas_{grids_, scene_.meshes};
 
@@ -80,9 +81,14 @@ protected:
     }
 };
 
+INSTANTIATE_TEST_SUITE_P(Samples, FieldKernel, testing::Values(sdf::SampleBits::k8, sdf::SampleBits::k16),
+                         [](const auto& tested) {
+                             return std::to_string(static_cast<int>(tested.param)) + "Bits";
+                         });
+
 constexpr sdf::HitMode kModes[] = {sdf::HitMode::kEps, sdf::HitMode::kSecant, sdf::HitMode::kCubic};
 
-TEST_F(FieldKernel, EveryInstructionSetGivesTheSameBits) {
+TEST_P(FieldKernel, EveryInstructionSetGivesTheSameBits) {
     const std::vector<sdf::MarchRay> rays = this->rays(20'000);
     ASSERT_GT(rays.size(), 10'000u);
     const std::vector<std::string> targets = sdf::kernel_targets();
@@ -100,7 +106,7 @@ TEST_F(FieldKernel, EveryInstructionSetGivesTheSameBits) {
     }
 }
 
-TEST_F(FieldKernel, AnswersDependOnTheirOwnRayAlone) {
+TEST_P(FieldKernel, AnswersDependOnTheirOwnRayAlone) {
     std::vector<sdf::MarchRay> rays = this->rays(3'000);
     std::vector<sdf::MarchHit> together(rays.size());
     sdf::march_rays(atlas_.table(), sdf::HitMode::kCubic, rays, together);
@@ -115,7 +121,7 @@ TEST_F(FieldKernel, AnswersDependOnTheirOwnRayAlone) {
     }
 }
 
-TEST_F(FieldKernel, CubicFindsWhatTheDoubleWalkFinds) {
+TEST_P(FieldKernel, CubicFindsWhatTheDoubleWalkFinds) {
     const std::vector<sdf::MarchRay> rays = this->rays(20'000);
     std::vector<sdf::MarchHit> hits(rays.size());
     sdf::march_rays(atlas_.table(), sdf::HitMode::kCubic, rays, hits);
@@ -140,7 +146,7 @@ TEST_F(FieldKernel, CubicFindsWhatTheDoubleWalkFinds) {
     EXPECT_LE(differing, compared / 2000);
 }
 
-TEST_F(FieldKernel, CellsOfMixedSignAreOccupied) {
+TEST_P(FieldKernel, CellsOfMixedSignAreOccupied) {
     for (std::size_t i = 0; i < grid_->brick_count(); ++i) {
         const sdf::Brick& brick = grid_->brick_at(static_cast<std::int32_t>(i));
         for (int cell = 0; cell < 343; ++cell) {
@@ -160,7 +166,7 @@ TEST_F(FieldKernel, CellsOfMixedSignAreOccupied) {
     }
 }
 
-TEST_F(FieldKernel, SurfacePointsAreTheClosestTrianglesAndTheMeanGradient) {
+TEST_P(FieldKernel, SurfacePointsAreTheClosestTrianglesAndTheMeanGradient) {
     const std::vector<sdf::MarchRay> rays = this->rays(5'000);
     std::vector<sdf::MarchHit> hits(rays.size());
     sdf::march_rays(atlas_.table(), sdf::HitMode::kCubic, rays, hits);

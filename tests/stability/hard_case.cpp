@@ -50,8 +50,9 @@ void for_each_way(const std::function<void(const Way&)>& visit) {
     sdf::select_kernel_target("");
 }
 
-BakedScene::BakedScene(core::Scene scene, int resolution) : scene_(std::move(scene)) {
+BakedScene::BakedScene(core::Scene scene, int resolution, sdf::SampleBits bits) : scene_(std::move(scene)) {
     sdf::BakeSettings settings;
+    settings.sample_bits = bits;
     settings.resolution = resolution;
     grids_ = sdf::grids_by_mesh(scene_, sdf::bake_scene(scene_, settings, {}));
     for (const sdf::HitMode mode : kHitModes) {

@@ -54,7 +54,7 @@ void for_each_way(const std::function<void(const Way&)>& visit);
 class BakedScene {
 public:
     /// @param resolution voxels on the longest side of each mesh
-    BakedScene(core::Scene scene, int resolution);
+    BakedScene(core::Scene scene, int resolution, sdf::SampleBits bits = sdf::SampleBits::k16);
     BakedScene(const BakedScene&) = delete;
     BakedScene& operator=(const BakedScene&) = delete;
 

@@ -196,34 +196,41 @@ TEST(Case31, NormalsAtCreasesAreUnitAndFaceTheRay) {
     }
 }
 
+/// The largest angle in degrees between normals of a sphere's field and the sphere's own.
+double worst_normal(const BakedScene& baked, sdf::HitMode mode, const std::vector<core::Ray>& rays) {
+    const core::HitStream hits = trace_both(baked.tracer(mode), stream_of(rays));
+    double worst = 0.0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const core::Hit hit = hits.get(i);
+        EXPECT_TRUE(hit.hit());
+        const glm::dvec3 point = glm::dvec3(rays[i].origin) + double(hit.t) * glm::dvec3(rays[i].direction);
+        const double cosine = glm::dot(glm::normalize(point), glm::dvec3(hit.normal));
+        worst = std::max(worst, glm::degrees(std::acos(std::min(1.0, cosine))));
+    }
+    return worst;
+}
+
 TEST(Case31, NormalsOfSpheresOfEightVoxelsAreWithinADegree) {
     const core::Mesh mesh = icosphere(6);
+    TestRandom random(8);
+    std::vector<core::Ray> rays;
+    for (int i = 0; i < ray_count(20'000, 1'000'000); ++i) {
+        const glm::dvec3 origin = 3.0 * random.direction();
+        rays.push_back(make_ray(origin, 0.95 * random.direction() - origin));
+    }
     for (const int resolution : {16, 24, 40}) {
-        const BakedScene baked(scene_of(mesh), resolution);
-        TestRandom random(8);
-        std::vector<core::Ray> rays;
-        for (int i = 0; i < ray_count(20'000, 1'000'000); ++i) {
-            const glm::dvec3 origin = 3.0 * random.direction();
-            rays.push_back(make_ray(origin, 0.95 * random.direction() - origin));
+        for (const sdf::SampleBits bits : {sdf::SampleBits::k16, sdf::SampleBits::k8}) {
+            const BakedScene baked(scene_of(mesh), resolution, bits);
+            for_each_way([&](const Way& way) {
+                const double worst = worst_normal(baked, way.mode, rays);
+                EXPECT_LE(worst, bits == sdf::SampleBits::k8 ? 3.0 : 1.0)
+                    << way << ", radius " << resolution / 2 << ", " << static_cast<int>(bits) << " bits";
+                if (std::getenv("FIELDLIGHT_FIGURES")) {
+                    std::cerr << "radius " << resolution / 2 << ", " << static_cast<int>(bits) << " bits, "
+                              << way << ": " << worst << " degrees\n";
+                }
+            });
         }
-        for_each_way([&](const Way& way) {
-            const core::HitStream hits = trace_both(baked.tracer(way.mode), stream_of(rays));
-            double worst = 0.0;
-            for (std::size_t i = 0; i < rays.size(); ++i) {
-                const core::Hit hit = hits.get(i);
-                ASSERT_TRUE(hit.hit());
-                const glm::dvec3 point =
-                    glm::dvec3(rays[i].origin) + double(hit.t) * glm::dvec3(rays[i].direction);
-                const double cosine = glm::dot(glm::normalize(point), glm::dvec3(hit.normal));
-                worst = std::max(worst, glm::degrees(std::acos(std::min(1.0, cosine))));
-            }
-            // Eps takes its normal from the last cell before the hit, up to a voxel away.
-            EXPECT_LE(worst, way.mode == sdf::HitMode::kEps ? 3.0 : 1.0)
-                << way << ", radius " << resolution / 2;
-            if (std::getenv("FIELDLIGHT_FIGURES")) {
-                std::cerr << "radius " << resolution / 2 << ", " << way << ": " << worst << " degrees\n";
-            }
-        });
     }
 }
 
