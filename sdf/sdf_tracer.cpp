@@ -162,14 +162,15 @@ void SdfTracer::march_active(bool any, Work& work) const {
             const std::uint32_t slot = work.active[i];
             const core::Ray ray = work.ray(slot);
             if (placed.triangles && traced.passage.t_min <= ray.t_min) {
-                finish_without_crossing(local_ray(ray, slot, traced, any), traced);
+                LocalRay local = local_ray(ray, slot, traced, any);
+                end_without_crossing(local, false, work);
             }
         } else if (any && placed.is_opaque_solid) {
             traced.nearest.t = t;
             traced.nearest.instance = traced.passage.instance;
         } else if (placed.is_sheet) {
             LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
-            take_or_go_on(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), {}, work);
+            take_crossing(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), {}, work);
         } else {
             work.met.push_back(static_cast<std::uint32_t>(i));
         }
