@@ -170,7 +170,7 @@ void SdfTracer::march_active(bool any, Work& work) const {
             traced.nearest.instance = traced.passage.instance;
         } else if (placed.is_sheet) {
             LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
-            take_crossing(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), {}, work);
+            take_sheet(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), work);
         } else {
             work.met.push_back(static_cast<std::uint32_t>(i));
         }

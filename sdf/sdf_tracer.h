@@ -102,12 +102,15 @@ private:
     void keep_nearer(const Nearest& found, Traced& traced) const;
     /// Takes a crossing if it is a visible surface, asks for triangles if it may be; else the ray goes on.
     void take_crossing(LocalRay& ray, const Crossing& crossing, const Surface& here, Work& work) const;
+    /// The same where there is nothing but shells: the triangles answer for the rest of the passage.
+    void take_sheet(LocalRay& ray, const Crossing& crossing, Work& work) const;
     static Stands stands_for(const PlacedGrid& placed, const Surface& here);
     /// Asks for the first visible triangle that the ray truly meets in [t_min, t_max].
     void ask(LocalRay& ray, double t_min, double t_max, const Surface& here, IfUnmet if_unmet,
              Work& work) const;
     /// Answers all that was asked.
     void answer(Work& work) const;
+    /// Takes a triangle that was met, if it is visible there.
     bool take_triangle(const LocalRay& ray, const TriangleQuery& query, Work& work) const;
     /// What becomes of a ray that has met no triangle.
     void settle(LocalRay& ray, const Surface& here, IfUnmet if_unmet, Work& work) const;

@@ -1,7 +1,9 @@
 // sdf/sdf_tracer_shells.cpp: what a crossing of the field stands for, and where a ray goes on if for nothing.
 //
-// A ray that comes into a shell looks for the triangles within, among all of its mesh, a few voxels far. If
-// it meets none, it goes on to its next crossing with the kernels, together with the others of its block.
+// A ray that comes into a shell asks for the triangles within, among all of its mesh, a few voxels far. If it
+// meets none, it goes on to its next crossing. Kernels do both, for all such rays of a block at once. Where
+// there are shells alone, the triangles answer from the first of them to the end: as measured, that takes
+// less time than to ask a few voxels far and to go on, where sheets lie one behind the other, too.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -51,6 +53,16 @@ SdfTracer::LocalRay SdfTracer::local_ray(const core::Ray& ray, std::uint32_t slo
             any && !has_alpha_};
 }
 
+void SdfTracer::take_sheet(LocalRay& ray, const Crossing& crossing, Work& work) const {
+    const Passage& passage = work.traced[ray.slot].passage;
+    // Into a shell: before it there is nothing. Out of one: the ray began within.
+    const double t_min =
+        crossing.enters_negative
+            ? std::max(ray.unmet_since, crossing.t - kFarthestTriangleVoxels * passage.t_per_voxel)
+            : ray.unmet_since;
+    ask(ray, t_min, passage.t_max, {}, IfUnmet::kEnd, work);
+}
+
 void SdfTracer::take_crossing(LocalRay& ray, const Crossing& crossing, const Surface& here,
                               Work& work) const {
     ray.come_to = crossing.t;
@@ -71,7 +83,6 @@ void SdfTracer::take_crossing(LocalRay& ray, const Crossing& crossing, const Sur
 }
 
 SdfTracer::Stands SdfTracer::stands_for(const PlacedGrid& placed, const Surface& here) {
-    if (placed.is_sheet) return Stands::kShell;
     if (here.triangle == kNoTriangle) return Stands::kNothing;
     const bool is_thickened = placed.grid->feature(here.triangle) != Feature::kSurface;
     if (here.distance > kFarthestTriangleVoxels + (is_thickened ? kHalfThicknessVoxels : 0.0)) {
@@ -203,8 +214,6 @@ void SdfTracer::go_on(Work& work) const {
             if (march_hit.status != MarchStatus::kHit || !(crossing.t <= traced.passage.t_max)) {
                 // It may have left the shell where the triangles had answered.
                 if (ray.is_inside) end_without_crossing(ray, true, work);
-            } else if (ray.placed.is_sheet) {
-                take_crossing(ray, crossing, {}, work);
             } else {
                 work.met.push_back(static_cast<std::uint32_t>(i));
             }
