@@ -180,7 +180,7 @@ void SdfTracer::settle(LocalRay& ray, const Surface& here, IfUnmet if_unmet, Wor
 }
 
 void SdfTracer::ask_at_end(LocalRay& ray, Work& work) const {
-    if (!ray.placed.triangles || !ray.is_inside) return;
+    if (!ray.placed.triangles || !ray.is_inside || !work.traced[ray.slot].may_end_inside()) return;
     ask(ray, ray.unmet_since, work.traced[ray.slot].passage.t_max, {}, IfUnmet::kEnd, work);
 }
 
@@ -213,7 +213,7 @@ void SdfTracer::go_on(Work& work) const {
             const Crossing crossing = crossing_of(march_hit, ray.come_to, traced.passage);
             if (march_hit.status != MarchStatus::kHit || !(crossing.t <= traced.passage.t_max)) {
                 // It may have left the shell where the triangles had answered.
-                if (ray.is_inside) end_without_crossing(ray, true, work);
+                if (ray.is_inside && traced.may_end_inside()) end_without_crossing(ray, true, work);
             } else {
                 work.met.push_back(static_cast<std::uint32_t>(i));
             }

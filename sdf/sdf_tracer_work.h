@@ -76,6 +76,9 @@ struct SdfTracer::Traced {
     Passage passage;
     std::uint32_t steps = 0;
     bool is_exhausted = false;
+
+    /// Whether the passage may end where the field is negative: never at the face of its box.
+    bool may_end_inside() const { return is_exhausted || passage.t_max >= nearest.t; }
 };
 
 /// What lies at a crossing: the closest of the triangles that its cell names.
