@@ -172,18 +172,17 @@ void SdfTracer::march_active(bool any, Work& work) const {
         if (march_hit.status == MarchStatus::kExhausted) traced.is_exhausted = true;
         const double t = traced.passage.t_at(march_hit);
         if (march_hit.status != MarchStatus::kHit || !(t <= traced.passage.t_max)) {
-            // Boxes of fields lie outside: only a ray that starts within may be in a shell.
-            const std::uint32_t slot = work.active[i];
-            const core::Ray ray = work.ray(slot);
-            if (placed.triangles && traced.passage.t_min <= ray.t_min) {
-                finish_without_crossing(local_ray(ray, slot, traced, any), traced);
+            // Only a ray that both starts and ends within the field's box may be in a shell all the way.
+            if (placed.triangles && traced.may_end_inside()) {
+                LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
+                if (traced.passage.t_min <= local.world.t_min) end_without_crossing(local, false, work);
             }
         } else if (any && placed.is_opaque_solid) {
             traced.nearest.t = t;
             traced.nearest.instance = traced.passage.instance;
         } else if (placed.is_sheet) {
             LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
-            take_or_go_on(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), {}, work);
+            take_sheet(local, crossing_of(march_hit, traced.passage.t_min, traced.passage), work);
         } else {
             work.met.push_back(static_cast<std::uint32_t>(i));
         }

@@ -71,11 +71,14 @@ public:
     };
 
 private:
+    struct Asked;
     struct LocalRay;
     struct Passage;
     struct Surface;
     struct Traced;
     struct Work;
+    enum class IfUnmet : std::uint8_t;
+    enum class Stands : std::uint8_t;
 
     /// The one path of both queries: finished(begin, end, Work&) for each block of rays. Stops at any hit if
     /// `any`.
@@ -89,29 +92,35 @@ private:
     void march_active(bool any, Work& work) const;
     /// Takes the crossing that the kernels found, number `at` of work.met, or adds it to work.going_on.
     void finish_crossing(std::size_t at, bool any, Work& work) const;
-    /// The end of a passage that began within a field with thickened features and came to no crossing.
-    void finish_without_crossing(LocalRay local, Traced& traced) const;
     /// Fills work.surface with what lies at the crossings of work.met.
     void find_surfaces(Work& work) const;
     /// Takes the rays of work.going_on to their first visible surface or to the end of their passage.
     void go_on(Work& work) const;
-    /// The same for one ray without a kernel, from crossing to crossing.
-    void walk_crossings(LocalRay& local, Traced& traced) const;
     LocalRay local_ray(const core::Ray& ray, std::uint32_t slot, const Traced& traced, bool any) const;
     /// The rest of a passage, for the kernels.
     MarchRay march_ray(const LocalRay& local, const Passage& passage) const;
     static Crossing crossing_of(const MarchHit& march_hit, double from, const Passage& passage);
     void keep_nearer(const NearestHit& found, Traced& traced) const;
-    /// Takes a crossing if it is a visible surface; else the ray goes on.
-    void take_or_go_on(LocalRay& local, const Crossing& crossing, const Surface& here, Work& work) const;
-    /// Whether a crossing is a visible surface, and which.
-    bool accept(LocalRay& ray, const Crossing& crossing, const Surface& here, NearestHit& found) const;
-    Surface surface_at(const LocalRay& ray, const Crossing& crossing) const;
+    /// Takes a crossing if it is a visible surface, asks for triangles if it may be; else the ray goes on.
+    void take_crossing(LocalRay& ray, const Crossing& crossing, const Surface& here, Work& work) const;
+    /// The same where there is nothing but shells: the triangles answer for the rest of the passage.
+    void take_sheet(LocalRay& ray, const Crossing& crossing, Work& work) const;
+    static Stands stands_for(const PlacedGrid& placed, const Surface& here);
+    /// Asks for the first visible triangle that the ray truly meets in [t_min, t_max].
+    void ask(LocalRay& ray, double t_min, double t_max, const Surface& here, IfUnmet if_unmet,
+             Work& work) const;
+    /// Answers all that was asked.
+    void answer(Work& work) const;
+    /// Takes a triangle that was met, if it is visible there.
+    bool take_triangle(const LocalRay& ray, const TriangleQuery& query, Work& work) const;
+    /// What becomes of a ray that has met no triangle.
+    void settle(LocalRay& ray, const Surface& here, IfUnmet if_unmet, Work& work) const;
+    /// The end of a passage: within a shell it may meet a triangle yet.
+    void ask_at_end(LocalRay& ray, Work& work) const;
+    /// The same from a place behind which there is no crossing.
+    /// @param if_unknown whether the ray is inside where the field does not say
+    void end_without_crossing(LocalRay& ray, bool if_unknown, Work& work) const;
     Surface surface_found(const Work& work, std::size_t at, std::int32_t triangle_base) const;
-    /// Where the ray ends within a shell.
-    void meet_shell_at_end(LocalRay& local, Traced& traced) const;
-    /// Finds the first visible triangle that the ray truly meets in [t_min, t_max].
-    bool meet_triangle(LocalRay& ray, double t_min, double t_max, NearestHit& found) const;
     /// The normal that faces the ray: of the triangle itself, or of the field.
     glm::vec3 triangle_side(const core::Ray& ray, const NearestHit& nearest) const;
     glm::vec3 field_side(const core::Ray& ray, const NearestHit& nearest) const;

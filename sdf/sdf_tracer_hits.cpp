@@ -62,7 +62,7 @@ void SdfTracer::finish_crossing(std::size_t at, bool any, Work& work) const {
         keep_nearer(found, traced);
     } else {
         LocalRay local = local_ray(work.ray(slot), slot, traced, any);
-        take_or_go_on(local, crossing, here, work);
+        take_crossing(local, crossing, here, work);
     }
 }
 

@@ -1,17 +1,17 @@
 // sdf/sdf_tracer_shells.cpp: what a crossing of the field stands for, and where a ray goes on if for nothing.
 //
-// A ray that comes into a shell looks for the triangles within, among all of its mesh, a few voxels far. If
-// it meets none, it goes on to its next crossing with the kernels, together with the others of its block.
+// A ray that comes into a shell asks for the triangles within, among all of its mesh, a few voxels far. If it
+// meets none, it goes on to its next crossing. Kernels do both, for all such rays of a block at once. Where
+// there are shells alone, the triangles answer from the first of them to the end: as measured, that takes
+// less time than to ask a few voxels far and to go on, where sheets lie one behind the other, too.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/trace/surface.h"
-#include "sdf/cell_triangles.h"
 #include "sdf/distance.h"
 #include "sdf/sdf_tracer.h"
 #include "sdf/sdf_tracer_work.h"
-#include "sdf/sphere_trace.h"
 
 namespace sdf {
 
@@ -25,14 +25,14 @@ constexpr double kShellVoxels = 0.25;
 /// lies farther is looked for where the ray leaves the shell.
 constexpr double kShellPassageVoxels = 8.0;
 
-/// So far behind a crossing that is none, a ray goes on: farther than positions in single precision round.
-constexpr double kPastCrossingVoxels = 0.01;
-
-/// Crossings that are none, after which the rest is left to the scalar walk: along a face of the lattice the
-/// same surface may be crossed again and again.
-constexpr int kMostRounds = 64;
-
 constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// So far behind a crossing that is none, a ray goes on: farther than positions in single precision round. It
+/// doubles every so many rounds: along a face of the lattice the same surface may be crossed again and again.
+double past_crossing_voxels(int round) {
+    constexpr int kDoubling = 16, kMost = 7;
+    return std::ldexp(0.01, std::min(round / kDoubling, kMost));
+}
 
 }  // namespace
 
@@ -53,150 +53,177 @@ SdfTracer::LocalRay SdfTracer::local_ray(const core::Ray& ray, std::uint32_t slo
             any && !has_alpha_};
 }
 
-bool SdfTracer::meet_triangle(LocalRay& ray, double t_min, double t_max, NearestHit& found) const {
+void SdfTracer::take_sheet(LocalRay& ray, const Crossing& crossing, Work& work) const {
+    const Passage& passage = work.traced[ray.slot].passage;
+    // Into a shell: before it there is nothing. Out of one: the ray began within.
+    const double t_min =
+        crossing.enters_negative
+            ? std::max(ray.unmet_since, crossing.t - kFarthestTriangleVoxels * passage.t_per_voxel)
+            : ray.unmet_since;
+    ask(ray, t_min, passage.t_max, {}, IfUnmet::kEnd, work);
+}
+
+void SdfTracer::take_crossing(LocalRay& ray, const Crossing& crossing, const Surface& here,
+                              Work& work) const {
+    ray.come_to = crossing.t;
+    ray.is_inside = crossing.enters_negative;
+    const Stands stands = stands_for(ray.placed, here);
+    const double voxel = work.traced[ray.slot].passage.t_per_voxel;
+    if (ray.placed.triangles && !crossing.enters_negative) {
+        // The ray was inside a shell, or inside a solid that a shell runs into.
+        ask(ray, ray.unmet_since, crossing.t, here,
+            stands == Stands::kSurface ? IfUnmet::kTakeSurface : IfUnmet::kGoOn, work);
+    } else if (stands == Stands::kShell) {
+        // The field of a plain surface next to the shell may lie behind its triangles.
+        ask(ray, std::max(ray.unmet_since, crossing.t - kFarthestTriangleVoxels * voxel),
+            crossing.t + kShellPassageVoxels * voxel, here, IfUnmet::kGoOn, work);
+    } else {
+        settle(ray, here, stands == Stands::kSurface ? IfUnmet::kTakeSurface : IfUnmet::kGoOn, work);
+    }
+}
+
+SdfTracer::Stands SdfTracer::stands_for(const PlacedGrid& placed, const Surface& here) {
+    if (here.triangle == kNoTriangle) return Stands::kNothing;
+    const bool is_thickened = placed.grid->feature(here.triangle) != Feature::kSurface;
+    if (here.distance > kFarthestTriangleVoxels + (is_thickened ? kHalfThicknessVoxels : 0.0)) {
+        return Stands::kNothing;
+    }
+    return is_thickened || (placed.triangles && here.distance > kShellVoxels) ? Stands::kShell
+                                                                              : Stands::kSurface;
+}
+
+void SdfTracer::ask(LocalRay& ray, double t_min, double t_max, const Surface& here, IfUnmet if_unmet,
+                    Work& work) const {
+    t_max = std::min(t_max, ray.t_max);
+    if (!(t_min <= t_max)) {
+        settle(ray, here, if_unmet, work);
+        return;
+    }
     const BrickGrid& grid = *ray.placed.grid;
     const double h = grid.voxel_size();
-    const glm::dvec3 origin = grid.origin() + h * ray.origin;
-    const glm::dvec3 direction = h * ray.direction;
-    t_max = std::min(t_max, ray.t_max);
-    while (t_min <= t_max) {
-        const FirstHit met = ray.placed.triangles->hit({origin, direction, t_min, t_max},
-                                                       ray.any ? FirstOrAny::kAny : FirstOrAny::kFirst);
-        if (!met) break;
-        found.t = met.t;
-        found.triangle = met.triangle;
-        found.is_triangle = true;
-        if (ray.any) {
-            found.instance = ray.instance;
-            return true;
+    work.asked.push_back({ray, here, if_unmet});
+    work.queries.push_back({ray.placed.triangles,
+                            {grid.origin() + h * ray.origin, h * ray.direction, t_min, t_max},
+                            ray.any ? FirstOrAny::kAny : FirstOrAny::kFirst,
+                            {}});
+}
+
+void SdfTracer::answer(Work& work) const {
+    while (!work.queries.empty()) {
+        hit_triangles(work.queries);
+        work.asked.swap(work.answered);
+        work.queries.swap(work.answers);
+        work.asked.clear();
+        work.queries.clear();
+        for (std::size_t i = 0; i < work.answered.size(); ++i) {
+            Asked& asked = work.answered[i];
+            const TriangleQuery& query = work.answers[i];
+            if (!query.hit) {
+                asked.ray.unmet_since = std::max(asked.ray.unmet_since, query.ray.t_max);
+                settle(asked.ray, asked.here, asked.if_unmet, work);
+            } else if (!take_triangle(asked.ray, query, work)) {
+                ask(asked.ray, std::nextafter(query.hit.t, kNever), query.ray.t_max, asked.here,
+                    asked.if_unmet, work);
+            }
         }
-        const glm::uvec3& corner = ray.mesh.triangles[met.triangle];
+    }
+}
+
+bool SdfTracer::take_triangle(const LocalRay& ray, const TriangleQuery& query, Work& work) const {
+    NearestHit found;
+    found.t = query.hit.t;
+    found.instance = ray.instance;
+    found.triangle = query.hit.triangle;
+    found.is_triangle = true;
+    if (!ray.any) {
+        const glm::uvec3& corner = ray.mesh.triangles[found.triangle];
         const Triangle triangle{glm::dvec3(ray.mesh.positions[corner.x]),
                                 glm::dvec3(ray.mesh.positions[corner.y]),
                                 glm::dvec3(ray.mesh.positions[corner.z])};
-        found.barycentrics = glm::vec2(closest_point(triangle, origin + met.t * direction).barycentrics);
-        if (!has_alpha_ ||
-            core::is_visible(scene_, ray.instance, met.triangle, found.barycentrics, ray.world.seed)) {
-            found.instance = ray.instance;
-            found.is_front = glm::dot(direction, triangle.scaled_normal()) < 0.0;
-            return true;
+        const glm::dvec3 position = query.ray.origin + found.t * query.ray.direction;
+        found.barycentrics = glm::vec2(closest_point(triangle, position).barycentrics);
+        if (has_alpha_ &&
+            !core::is_visible(scene_, ray.instance, found.triangle, found.barycentrics, ray.world.seed)) {
+            return false;
         }
-        t_min = std::nextafter(met.t, kNever);
+        found.is_front = glm::dot(query.ray.direction, triangle.scaled_normal()) < 0.0;
     }
-    ray.unmet_since = std::max(ray.unmet_since, t_max);
-    return false;
-}
-
-bool SdfTracer::accept(LocalRay& ray, const Crossing& crossing, const Surface& here,
-                       NearestHit& found) const {
-    ray.come_to = crossing.t;
-    ray.is_inside = crossing.enters_negative;
-    // The ray was inside a shell, or inside a solid that a shell runs into.
-    if (ray.placed.triangles && !crossing.enters_negative &&
-        meet_triangle(ray, ray.unmet_since, crossing.t, found)) {
-        return true;
-    }
-    if (!ray.placed.is_sheet && here.triangle == kNoTriangle) return false;
-    const Feature feature = ray.placed.is_sheet ? Feature::kSheet : ray.placed.grid->feature(here.triangle);
-    const double farthest =
-        kFarthestTriangleVoxels + (feature == Feature::kSurface ? 0.0 : kHalfThicknessVoxels);
-    if (!ray.placed.is_sheet && here.distance > farthest) return false;
-    if (feature != Feature::kSurface || (ray.placed.triangles && here.distance > kShellVoxels)) {
-        if (!crossing.enters_negative) return false;
-        // The field of a plain surface next to the shell may lie behind its triangles.
-        const double speed = glm::length(ray.direction);
-        return meet_triangle(ray, std::max(ray.unmet_since, crossing.t - kFarthestTriangleVoxels / speed),
-                             crossing.t + kShellPassageVoxels / speed, found);
-    }
-    if (has_alpha_ &&
-        !core::is_visible(scene_, ray.instance, here.triangle, here.barycentrics, ray.world.seed)) {
-        return false;
-    }
-    found.t = crossing.t;
-    found.instance = ray.instance;
-    found.triangle = here.triangle;
-    found.barycentrics = here.barycentrics;
-    found.is_front = here.is_front;
-    found.gradient = here.gradient;
-    found.enters_negative = crossing.enters_negative;
-    found.is_triangle = false;
+    keep_nearer(found, work.traced[ray.slot]);
     return true;
 }
 
-void SdfTracer::take_or_go_on(LocalRay& local, const Crossing& crossing, const Surface& here,
-                              Work& work) const {
-    Traced& traced = work.traced[local.slot];
-    NearestHit found;
-    if (accept(local, crossing, here, found)) {
+void SdfTracer::settle(LocalRay& ray, const Surface& here, IfUnmet if_unmet, Work& work) const {
+    Traced& traced = work.traced[ray.slot];
+    if (if_unmet == IfUnmet::kEnd) return;
+    if (if_unmet == IfUnmet::kTakeSurface &&
+        (!has_alpha_ ||
+         core::is_visible(scene_, ray.instance, here.triangle, here.barycentrics, ray.world.seed))) {
+        NearestHit found;
+        found.t = ray.come_to;
+        found.instance = ray.instance;
+        found.triangle = here.triangle;
+        found.barycentrics = here.barycentrics;
+        found.is_front = here.is_front;
+        found.gradient = here.gradient;
+        found.enters_negative = ray.is_inside;
         keep_nearer(found, traced);
         return;
     }
     // Up to `unmet_since` the triangles themselves have answered.
-    local.come_to =
-        std::max(crossing.t + kPastCrossingVoxels * traced.passage.t_per_voxel, local.unmet_since);
-    if (local.come_to < traced.passage.t_max) {
-        work.going_on.push_back(local);
+    ray.come_to = std::max(ray.come_to + past_crossing_voxels(work.round) * traced.passage.t_per_voxel,
+                           ray.unmet_since);
+    if (ray.come_to < traced.passage.t_max) {
+        work.going_on.push_back(ray);
     } else {
-        meet_shell_at_end(local, traced);
+        ask_at_end(ray, work);
     }
 }
 
-void SdfTracer::finish_without_crossing(LocalRay local, Traced& traced) const {
-    const glm::dvec3 start = local.origin + traced.passage.t_min * local.direction;
-    local.is_inside = distance_at(*local.placed.grid, start).value_or(1.0) < 0.0;
-    meet_shell_at_end(local, traced);
+void SdfTracer::ask_at_end(LocalRay& ray, Work& work) const {
+    if (!ray.placed.triangles || !ray.is_inside || !work.traced[ray.slot].may_end_inside()) return;
+    ask(ray, ray.unmet_since, work.traced[ray.slot].passage.t_max, {}, IfUnmet::kEnd, work);
 }
 
-void SdfTracer::meet_shell_at_end(LocalRay& local, Traced& traced) const {
-    if (!local.placed.triangles || !local.is_inside) return;
-    NearestHit found;
-    meet_triangle(local, local.unmet_since, traced.passage.t_max, found);
-    keep_nearer(found, traced);
+void SdfTracer::end_without_crossing(LocalRay& ray, bool if_unknown, Work& work) const {
+    const glm::dvec3 position = ray.origin + ray.come_to * ray.direction;
+    ray.is_inside = distance_at(*ray.placed.grid, position).value_or(if_unknown ? -1.0 : 1.0) < 0.0;
+    ask_at_end(ray, work);
 }
 
 void SdfTracer::go_on(Work& work) const {
-    for (int round = 0; !work.going_on.empty(); ++round) {
+    for (work.round = 0;; ++work.round) {
+        answer(work);
+        if (work.going_on.empty()) return;
         work.walking.swap(work.going_on);
         work.going_on.clear();
         const std::size_t count = work.walking.size();
-        if (round == kMostRounds) {
-            for (LocalRay& local : work.walking) walk_crossings(local, work.traced[local.slot]);
-            return;
-        }
         for (std::size_t i = 0; i < count; ++i) {
-            const LocalRay& local = work.walking[i];
-            work.march_rays[i] = march_ray(local, work.traced[local.slot].passage);
+            const LocalRay& ray = work.walking[i];
+            work.march_rays[i] = march_ray(ray, work.traced[ray.slot].passage);
         }
         march_rays(atlas_.table(), HitMode::kCubic, std::span(work.march_rays).first(count),
                    std::span(work.march_hits).first(count));
         work.met.clear();
         for (std::size_t i = 0; i < count; ++i) {
-            LocalRay& local = work.walking[i];
-            Traced& traced = work.traced[local.slot];
+            LocalRay& ray = work.walking[i];
+            Traced& traced = work.traced[ray.slot];
             const MarchHit& march_hit = work.march_hits[i];
             traced.steps += march_hit.steps;
             traced.is_exhausted = traced.is_exhausted || march_hit.status == MarchStatus::kExhausted;
-            const Crossing crossing = crossing_of(march_hit, local.come_to, traced.passage);
+            const Crossing crossing = crossing_of(march_hit, ray.come_to, traced.passage);
             if (march_hit.status != MarchStatus::kHit || !(crossing.t <= traced.passage.t_max)) {
-                // Whether it is still inside, where the triangles had answered.
-                local.is_inside =
-                    local.is_inside &&
-                    distance_at(*local.placed.grid, local.origin + local.come_to * local.direction)
-                            .value_or(-1.0) < 0.0;
-                meet_shell_at_end(local, traced);
-            } else if (local.placed.is_sheet) {
-                take_or_go_on(local, crossing, {}, work);
+                // It may have left the shell where the triangles had answered.
+                if (ray.is_inside && traced.may_end_inside()) end_without_crossing(ray, true, work);
             } else {
                 work.met.push_back(static_cast<std::uint32_t>(i));
             }
         }
         find_surfaces(work);
         for (std::size_t i = 0; i < work.met.size(); ++i) {
-            LocalRay& local = work.walking[work.met[i]];
-            take_or_go_on(
-                local,
-                crossing_of(work.march_hits[work.met[i]], local.come_to, work.traced[local.slot].passage),
-                surface_found(work, i, local.placed.place.triangle_base), work);
+            LocalRay& ray = work.walking[work.met[i]];
+            const Passage& passage = work.traced[ray.slot].passage;
+            take_crossing(ray, crossing_of(work.march_hits[work.met[i]], ray.come_to, passage),
+                          surface_found(work, i, ray.placed.place.triangle_base), work);
         }
     }
 }
@@ -226,39 +253,6 @@ MarchRay SdfTracer::march_ray(const LocalRay& local, const Passage& passage) con
     to.top_stride_x = placement.top_stride_x;
     to.top_stride_y = placement.top_stride_y;
     return to;
-}
-
-SdfTracer::Surface SdfTracer::surface_at(const LocalRay& ray, const Crossing& crossing) const {
-    const BrickGrid& grid = *ray.placed.grid;
-    const glm::ivec3 cell = crossing.cell - crossing.cell / kBrickCells * kBrickCells;
-    const CellTriangles triangles(ray.mesh, grid, grid.brick_at(crossing.brick), cell);
-    const glm::dvec3 voxel = glm::dvec3(crossing.cell) + crossing.point;
-    const TriangleHit hit = triangles.closest(grid.origin() + grid.voxel_size() * voxel);
-    Surface here;
-    if (!hit) return here;
-    here.triangle = hit.index;
-    here.distance = hit.distance / grid.voxel_size();
-    here.barycentrics = glm::vec2(hit.point.barycentrics);
-    here.is_front = glm::dot(ray.direction, hit.corners.scaled_normal()) < 0.0;
-    here.gradient = glm::vec3(smooth_gradient(grid, crossing.cell, crossing.point));
-    return here;
-}
-
-void SdfTracer::walk_crossings(LocalRay& local, Traced& traced) const {
-    const Passage& passage = traced.passage;
-    RayMarch march(*local.placed.grid, local.origin, local.direction, local.come_to, passage.t_max);
-    NearestHit found;
-    Crossing crossing;
-    while (!found.found() && march.next(crossing)) {
-        accept(local, crossing, surface_at(local, crossing), found);
-    }
-    traced.steps += march.steps();
-    traced.is_exhausted = traced.is_exhausted || march.is_exhausted();
-    if (found.found()) {
-        keep_nearer(found, traced);
-    } else {
-        meet_shell_at_end(local, traced);
-    }
 }
 
 }  // namespace sdf

@@ -43,7 +43,7 @@ struct SdfTracer::LocalRay {
     glm::dvec3 direction;  ///< Voxels a world unit.
     double t_max;          ///< The nearest hit of other instances, or the ray's own end.
     double unmet_since;    ///< No visible triangle is met before; at first the ray's start.
-    double come_to;        ///< Where the walk goes on.
+    double come_to;        ///< Where the walk is: at a crossing, or where it goes on.
     bool is_inside;        ///< Whether the field is negative there.
     bool any;              ///< Whether any triangle will do, not the first alone.
 };
@@ -63,6 +63,35 @@ struct SdfTracer::Traced {
     Passage passage;
     std::uint32_t steps = 0;
     bool is_exhausted = false;
+
+    /// Whether the passage may end where the field is negative: never at the face of its box.
+    bool may_end_inside() const { return is_exhausted || passage.t_max >= nearest.t; }
+};
+
+/// What lies at a crossing: the closest of the triangles that its cell names.
+struct SdfTracer::Surface {
+    std::uint32_t triangle = kNoTriangle;
+    double distance = 0.0;  ///< From the crossing, voxels.
+    glm::vec2 barycentrics{0.0f};
+    bool is_front = true;      ///< Whether the ray comes from its front.
+    glm::vec3 gradient{0.0f};  ///< Of the field.
+};
+
+/// What a crossing of the field stands for.
+enum class SdfTracer::Stands : std::uint8_t {
+    kNothing,  ///< The lid of a hole.
+    kShell,    ///< Triangles within decide.
+    kSurface,  ///< A surface that lies where the field says.
+};
+
+/// What becomes of a ray that meets no triangle.
+enum class SdfTracer::IfUnmet : std::uint8_t { kEnd, kGoOn, kTakeSurface };
+
+/// A ray that waits for the answer of its mesh's triangles.
+struct SdfTracer::Asked {
+    LocalRay ray;
+    Surface here;  ///< At the crossing to which the ray has come.
+    IfUnmet if_unmet;
 };
 
 /// Rays that are traced together: enough to keep the lanes of a kernel busy, few enough for the cache.
@@ -84,19 +113,13 @@ struct SdfTracer::Work {
     std::vector<MarchHit> march_hits{kBlockRays};
     std::vector<std::uint32_t> met;  ///< Entries of `active` whose crossing is looked up in `surface`.
     SurfacePoints surface;
-    std::vector<LocalRay> going_on;  ///< Rays whose crossing was no visible surface.
-    std::vector<LocalRay> walking;   ///< Those that the kernels take to their next.
+    std::vector<Asked> asked, answered;
+    std::vector<TriangleQuery> queries, answers;  ///< Of the same rays.
+    int round = 0;                                ///< How often rays went on already.
+    std::vector<LocalRay> going_on;               ///< Rays whose crossing was no visible surface.
+    std::vector<LocalRay> walking;                ///< Those that the kernels take to their next.
 
     core::Ray ray(std::uint32_t slot) const { return rays->get(first_ray + slot); }
-};
-
-/// What lies at a crossing: the closest of the triangles that its cell names.
-struct SdfTracer::Surface {
-    std::uint32_t triangle = kNoTriangle;
-    double distance = 0.0;  ///< From the crossing, voxels.
-    glm::vec2 barycentrics{0.0f};
-    bool is_front = true;      ///< Whether the ray comes from its front.
-    glm::vec3 gradient{0.0f};  ///< Of the field.
 };
 
 }  // namespace sdf

@@ -6,6 +6,7 @@
 #define HWY_TARGET_INCLUDE "sdf/triangle_ray_kernel.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -47,6 +48,7 @@ struct BoxRay {
     int near_side[3];  ///< Through which of the two it comes in.
     double t_min, speed;
 
+    BoxRay() = default;
     BoxRay(const RaySegment& ray, float reach) {
         const glm::dvec3& d = ray.direction;
         t_min = ray.t_min;
@@ -170,26 +172,72 @@ HWY_INLINE HWY_ATTR void meet_block(const TriangleRayTree::Block& block, const R
     }
 }
 
-HWY_ATTR FirstHit hit_triangles(const TriangleRayTree& tree, const RaySegment& segment, FirstOrAny which) {
+/// A query under way.
+struct Walk {
+    TriangleQuery* query = nullptr;
+    const TriangleRayTree* tree = nullptr;
+    BoxRay ray;
     FirstHit best;
-    best.t = segment.t_max;
-    const BoxRay ray(segment, tree.reach());
-    float limit = ray.distance(best.t);
-    Entry stack[BoxTree::kStackSize];
+    float limit = 0.0f;
     int depth = 0;
-    stack[depth++] = {0.0f, 0};
-    while (depth > 0) {
-        const Entry top = stack[--depth];
-        if (top.distance > limit) continue;
-        if (top.child >= 0) {
-            push_children(ray, tree.nodes()[top.child], limit, stack, depth);
-            continue;
-        }
-        meet_block(tree.blocks()[~top.child], segment, best);
-        if (best && which == FirstOrAny::kAny) break;
-        limit = ray.distance(best.t);
+    Entry stack[BoxTree::kStackSize];
+};
+
+HWY_INLINE HWY_ATTR void start(Walk& walk, TriangleQuery& query) {
+    walk.query = &query;
+    walk.tree = query.tree;
+    walk.ray = BoxRay(query.ray, query.tree->reach());
+    walk.best = {query.ray.t_max, kNoTriangle};
+    walk.limit = walk.ray.distance(query.ray.t_max);
+    walk.depth = 0;
+    const bool is_empty = query.tree->empty() || !(query.ray.t_min <= query.ray.t_max);
+    if (!is_empty) walk.stack[walk.depth++] = {0.0f, 0};
+}
+
+HWY_INLINE HWY_ATTR void prefetch(const void* memory, std::size_t size) {
+    for (std::size_t at = 0; at < size; at += 64) hwy::Prefetch(static_cast<const char*>(memory) + at);
+}
+
+/// Tests the nearest box that waits. @returns whether any is left
+HWY_INLINE HWY_ATTR bool advance(Walk& walk) {
+    if (walk.depth == 0) return false;
+    const Entry top = walk.stack[--walk.depth];
+    if (top.child >= 0) {
+        push_children(walk.ray, walk.tree->nodes()[top.child], walk.limit, walk.stack, walk.depth);
+    } else {
+        meet_block(walk.tree->blocks()[~top.child], walk.query->ray, walk.best);
+        if (walk.best && walk.query->which == FirstOrAny::kAny) return false;
+        walk.limit = walk.ray.distance(walk.best.t);
     }
-    return best;
+    while (walk.depth > 0 && walk.stack[walk.depth - 1].distance > walk.limit) --walk.depth;
+    if (walk.depth == 0) return false;
+    const std::int32_t next = walk.stack[walk.depth - 1].child;
+    if (next >= 0) {
+        prefetch(walk.tree->nodes() + next, sizeof(BoxTree::Node));
+    } else {
+        prefetch(walk.tree->blocks() + ~next, sizeof(TriangleRayTree::Block));
+    }
+    return true;
+}
+
+HWY_ATTR void hit_triangles(TriangleQuery* queries, std::size_t count) {
+    // Walks in turn: while one waits for memory, the others compute.
+    constexpr std::size_t kWalks = 8;
+    Walk walks[kWalks];
+    std::size_t next = 0, busy = 0;
+    for (; busy < kWalks && next < count; ++busy, ++next) start(walks[busy], queries[next]);
+    while (busy > 0) {
+        for (std::size_t i = 0; i < busy; ++i) {
+            if (advance(walks[i])) continue;
+            walks[i].query->hit = walks[i].best ? walks[i].best : FirstHit{};
+            if (next < count) {
+                start(walks[i], queries[next++]);
+            } else {
+                walks[i] = walks[--busy];
+                --i;
+            }
+        }
+    }
 }
 
 }  // namespace HWY_NAMESPACE
@@ -202,10 +250,8 @@ namespace sdf {
 
 HWY_EXPORT(hit_triangles);
 
-FirstHit TriangleRayTree::hit(const RaySegment& ray, FirstOrAny which) const {
-    if (empty() || !(ray.t_min <= ray.t_max)) return {};
-    const FirstHit found = HWY_DYNAMIC_DISPATCH(hit_triangles)(*this, ray, which);
-    return found ? found : FirstHit{};
+void hit_triangles(std::span<TriangleQuery> queries) {
+    HWY_DYNAMIC_DISPATCH(hit_triangles)(queries.data(), queries.size());
 }
 
 }  // namespace sdf

@@ -30,6 +30,12 @@ TriangleRayTree::TriangleRayTree(std::span<const glm::vec3> positions, std::span
     }
 }
 
+FirstHit TriangleRayTree::hit(const RaySegment& ray, FirstOrAny which) const {
+    TriangleQuery query{this, ray, which, {}};
+    hit_triangles(std::span(&query, 1));
+    return query.hit;
+}
+
 std::size_t TriangleRayTree::bytes() const {
     return nodes_.capacity() * sizeof(BoxTree::Node) + blocks_.capacity() * sizeof(Block);
 }

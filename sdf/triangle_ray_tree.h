@@ -41,7 +41,7 @@ public:
                     std::span<const std::uint32_t> selection);
 
     /// The first triangle that the ray meets in [t_min, t_max]; at equal t the lower index wins. With kAny,
-    /// one of those that it meets. Same bits on every instruction set.
+    /// one of those that it meets.
     FirstHit hit(const RaySegment& ray, FirstOrAny which = FirstOrAny::kFirst) const;
 
     bool empty() const { return blocks_.empty(); }
@@ -60,5 +60,17 @@ private:
     std::vector<Block> blocks_;
     float reach_ = 0.0f;
 };
+
+/// A question to a tree, and its answer.
+struct TriangleQuery {
+    const TriangleRayTree* tree = nullptr;
+    RaySegment ray;
+    FirstOrAny which = FirstOrAny::kFirst;
+    FirstHit hit;  ///< As of TriangleRayTree::hit().
+};
+
+/// Answers many queries, several at a time. Each answer depends on its own query alone, and is the same to
+/// the last bit on every instruction set.
+void hit_triangles(std::span<TriangleQuery> queries);
 
 }  // namespace sdf

@@ -110,6 +110,67 @@ TEST(ThickenedFeatures, AnyHitAgreesWithClosestHitHoweverARayEnds) {
     }
 }
 
+/// Layers one behind the other along z, `spacing` voxels apart, of the thicknesses in turn; 0: sheets.
+core::Mesh layers(int count, double voxel, double spacing, const std::vector<double>& thicknesses) {
+    std::vector<core::Mesh> all;
+    for (int i = 0; i < count; ++i) {
+        const double thickness = thicknesses[static_cast<std::size_t>(i) % thicknesses.size()];
+        const core::Mesh layer = thickness == 0.0
+                                     ? quad(0.5f, 0.5f)
+                                     : box({0.25f, 0.25f, static_cast<float>(0.5 * thickness * voxel)});
+        all.push_back(moved(layer, translation({0, 0, i * spacing * voxel})));
+    }
+    core::Mesh mesh = all[0];
+    for (std::size_t i = 1; i < all.size(); ++i) mesh = merged(mesh, all[i]);
+    return mesh;
+}
+
+TEST(ThickenedFeatures, AreSeenBehindAsManyTransparentOnesAsThereAre) {
+    constexpr double kVoxel = 1.0 / 16;
+    const struct {
+        const char* name;
+        double spacing;
+        std::vector<double> thicknesses;
+    } stacks[] = {{"plates", 6.0, {3.0}},
+                  {"sheets", 1.3, {0.0}},
+                  {"thin walls", 4.0, {0.2}},
+                  {"plates and thin walls", 6.0, {3.0, 0.2}},
+                  {"plates and sheets", 6.0, {3.0, 0.0}}};
+    constexpr int kLayers = 70;
+    for (const auto& stack : stacks) {
+        core::Scene scene = scene_of(layers(kLayers, kVoxel, stack.spacing, stack.thicknesses));
+        scene.materials[0].alpha_mode = core::AlphaMode::kBlend;
+        scene.materials[0].base_color.a = 0.01f;
+        const sdf::SdfTracer fields = tracer_of(scene, kVoxel);
+        const core::TriangleTracer triangles(scene);
+        TestRandom random(8);
+        std::vector<core::Ray> rays;
+        for (int i = 0; i < 3000; ++i) {
+            const glm::dvec3 tilt(random.uniform(-0.004, 0.004), random.uniform(-0.004, 0.004), 1.0);
+            rays.push_back(make_ray({random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), -1.0}, tilt));
+            rays.back().seed = static_cast<std::uint32_t>(i);
+        }
+        const core::RayStream stream = stream_of(rays);
+        const core::HitStream expected = closest(triangles, stream), found = closest(fields, stream);
+        std::vector<std::uint8_t> occluded(rays.size());
+        fields.trace_occluded(stream, occluded);
+        int hits = 0, behind = 0, different = 0;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            const core::Hit a = expected.get(i), b = found.get(i);
+            ASSERT_EQ(b.hit(), occluded[i] != 0) << stack.name;
+            ASSERT_NE(b.status, core::HitStatus::kExhausted) << stack.name;
+            hits += a.hit();
+            behind += a.hit() && a.t > 0.7 * kLayers * stack.spacing * kVoxel;
+            different += a.hit() != b.hit() ||
+                         (a.hit() && (a.triangle != b.triangle || std::abs(a.t - b.t) > 0.1 * kVoxel));
+        }
+        EXPECT_GT(hits, 1000) << stack.name;
+        EXPECT_GT(behind, 100) << stack.name;
+        // At a diagonal the field may name the other triangle, which the seed may have hidden.
+        EXPECT_LE(different, 30) << stack.name;
+    }
+}
+
 TEST(ThickenedFeatures, ALampJustUnderACeilingIsSeen) {
     // Two instances: the lamp lies within the ceiling's shell.
     constexpr double kVoxel = 1.0 / 32;

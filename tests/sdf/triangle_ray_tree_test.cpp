@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
-#include <optional>
 
 #include "sdf/field_kernel.h"
 #include "tests/sdf/baked_shapes.h"
@@ -231,6 +230,29 @@ TEST(TriangleRayTree, IsNoDeeperThanItsStackWhateverTheTriangles) {
             const double scale = std::pow(3.0, -random.uniform(0.0, 20.0));
             const sdf::RaySegment ray{scale * anywhere(random, 2.0), random.direction(), 0.0, 4.0 * scale};
             expect_same(tree.hit(ray), brute_force(soup, ray));
+        }
+    });
+}
+
+TEST(TriangleRayTree, AnswersManyQueriesToSeveralTreesAsEachAlone) {
+    TestRandom random(16);
+    const Soup soups[] = {random_soup(random, 200, 0.3, 0.7), random_soup(random, 3, 0.9, 0.7), Soup()};
+    on_every_target([&] {
+        const sdf::TriangleRayTree trees[] = {soups[0].tree(), soups[1].tree(), soups[2].tree()};
+        for (const std::size_t count : {0, 1, 7, 8, 9, 500}) {
+            std::vector<sdf::TriangleQuery> queries(count);
+            for (sdf::TriangleQuery& query : queries) {
+                query.tree = &trees[static_cast<std::size_t>(random.uniform(0.0, 2.999))];
+                query.ray = {anywhere(random, 1.0), random.direction(), 0.0, random.uniform(-0.1, 2.0)};
+                query.which =
+                    random.uniform(0.0, 1.0) < 0.3 ? sdf::FirstOrAny::kAny : sdf::FirstOrAny::kFirst;
+            }
+            sdf::hit_triangles(queries);
+            for (const sdf::TriangleQuery& query : queries) {
+                expect_same(query.hit, query.tree->hit(query.ray, query.which));
+                if (query.which == sdf::FirstOrAny::kAny) continue;
+                expect_same(query.hit, brute_force(soups[query.tree - trees], query.ray));
+            }
         }
     });
 }
