@@ -12,6 +12,8 @@
 namespace tests {
 namespace {
 
+constexpr double kPi = 3.14159265358979323846;
+
 sdf::SampledField bake(const core::Mesh& mesh, double voxel) {
     return sdf::bake_mesh({mesh.positions, mesh.triangles}, {.voxel_size = voxel});
 }
@@ -95,6 +97,32 @@ TEST(SheetRays, NonePassesThroughACloth) {
     EXPECT_EQ(passages.passed, 0u) << passages;
     EXPECT_EQ(passages.unoccluded, 0u) << passages;
     EXPECT_LE(passages.unconfirmed, 20u) << passages;
+}
+
+/// An open box, and a deck in its opening or a little below.
+core::Mesh hull_with_deck(double below) {
+    core::Mesh hull = box({0.5f, 1.5f, 0.5f});
+    std::erase_if(hull.triangles, [&](const glm::uvec3& corner) {
+        return hull.positions[corner.x].y > 1.0f && hull.positions[corner.y].y > 1.0f &&
+               hull.positions[corner.z].y > 1.0f;
+    });
+    const core::Mesh open = make_mesh("hull", hull.positions, hull.normals, {}, hull.triangles);
+    return merged(open, moved(quad(0.9f, 0.9f, 3, 3), translation({0.0, 1.5 - below, 0.0}) *
+                                                          rotation(0.5 * kPi, glm::dvec3(1, 0, 0))));
+}
+
+TEST(SheetRays, NonePassesADeckInTheOpeningOfAHull) {
+    // The deck's sides lie on either side of where the winding number closes the hull, or it lies inside, and
+    // always differently between samples.
+    for (double below = 0.0; below < 0.1; below += 0.009) {
+        const BakedSheet hull(scene_of(hull_with_deck(below)));
+        ASSERT_EQ(hull.grids[0]->info().mesh_class, sdf::MeshClass::kMixed);
+        const SheetTargets targets(hull.scene, hull.grids);
+        const AimedRays aimed = targets.aim(5'000, 7);
+        const SheetPassages passages =
+            count_passages(aimed, sdf::SdfTracer(hull.scene, hull.grids), core::TriangleTracer(hull.scene));
+        EXPECT_EQ(passages.passed, 0u) << below << ": " << passages;
+    }
 }
 
 TEST(SheetRays, CountThoseThatAHoleLetsThrough) {

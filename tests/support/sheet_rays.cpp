@@ -93,32 +93,47 @@ SheetTargets::SheetMesh SheetTargets::sheets_of(const core::Mesh& mesh, const sd
     return sheets;
 }
 
+std::vector<SheetTargets::Target> SheetTargets::targets(std::size_t count, TestRandom& random) const {
+    constexpr std::size_t kMostTries = 20;
+    std::vector<Target> found;
+    for (std::size_t tries = 0; tries < kMostTries * count && found.size() < count; ++tries) {
+        const std::uint32_t number = instances_[random.bits() % instances_.size()];
+        const SheetMesh& sheets = meshes_[scene_.instances[number].mesh];
+        const double chance = random.uniform() * sheets.cumulative.back();
+        const auto place = std::upper_bound(sheets.cumulative.begin(), sheets.cumulative.end() - 1, chance);
+        const auto triangle = static_cast<std::uint32_t>(place - sheets.cumulative.begin());
+        const glm::dvec3 point = random_point(sheets.triangles[triangle], random);
+        const sdf::ClosestTriangle border{sheets.voxel * sheets.voxel, sdf::kNoTriangle};
+        if (sheets.borders.closest(point, border).triangle == sdf::kNoTriangle) {
+            found.push_back({number, triangle, point});
+        }
+    }
+    return found;
+}
+
 AimedRays SheetTargets::aim(std::size_t count, std::uint32_t seed) const {
-    constexpr std::size_t kMostTries = 100;
     AimedRays aimed;
     TestRandom random(seed);
+    const std::vector<Target> found = targets(count, random);
     std::vector<core::Ray> rays;
-    for (std::size_t tries = 0; tries < kMostTries * count && rays.size() < count; ++tries) {
-        const std::uint32_t number = instances_[random.bits() % instances_.size()];
-        const core::Instance& instance = scene_.instances[number];
+    for (std::size_t tries = 0; !found.empty() && tries < 2 * count && rays.size() < count; ++tries) {
+        const Target& target = found[tries % found.size()];
+        const core::Instance& instance = scene_.instances[target.instance];
         const SheetMesh& sheets = meshes_[instance.mesh];
-        const double chance = random.uniform() * sheets.cumulative.back();
-        const auto found = std::upper_bound(sheets.cumulative.begin(), sheets.cumulative.end() - 1, chance);
-        const glm::dvec3 point = random_point(
-            sheets.triangles[static_cast<std::size_t>(found - sheets.cumulative.begin())], random);
-        const double voxel = sheets.voxel;
-        if (sheets.borders.closest(point, {voxel * voxel, sdf::kNoTriangle}).triangle != sdf::kNoTriangle) {
-            continue;
-        }
+        const glm::dmat3 local_from_world(instance.local_from_world);
         const glm::dvec3 direction = random.direction();
-        const double along = voxel / glm::length(glm::dmat3(instance.local_from_world) * direction);
+        const double along = sheets.voxel / glm::length(local_from_world * direction);
         const double nearest = kNearestStartVoxels * along;
         const double distance = nearest * std::pow(std::max(size_ / nearest, 1.0), random.uniform());
-        const glm::dvec3 world(instance.world_from_local * glm::dvec4(point, 1.0));
+        const glm::dvec3 world(instance.world_from_local * glm::dvec4(target.point, 1.0));
         const core::Ray ray = make_ray(world - distance * direction, direction);
+        const double t =
+            sdf::intersect(sheets.triangles[target.triangle],
+                           glm::dvec3(instance.local_from_world * glm::dvec4(glm::dvec3(ray.origin), 1.0)),
+                           local_from_world * glm::dvec3(ray.direction));
+        if (!(t > 0.0 && std::abs(t - distance) < along)) continue;
         rays.push_back(ray);
-        aimed.target.push_back(
-            static_cast<float>(glm::dot(world - glm::dvec3(ray.origin), glm::dvec3(ray.direction))));
+        aimed.target.push_back(static_cast<float>(t));
         aimed.voxel.push_back(static_cast<float>(along));
     }
     aimed.rays = stream_of(rays);

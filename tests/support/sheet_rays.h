@@ -15,10 +15,12 @@
 
 namespace tests {
 
+class TestRandom;
+
 /// Rays and what each is aimed at.
 struct AimedRays {
     core::RayStream rays;
-    std::vector<float> target;  ///< Where each ray comes to its point of a sheet.
+    std::vector<float> target;  ///< Where each ray meets the triangle it is aimed at, by double precision.
     std::vector<float> voxel;   ///< A voxel of that mesh along the ray, as a length of the ray.
 };
 
@@ -32,11 +34,19 @@ public:
 
     /// Rays to random points of sheets at least a voxel from every border, from random directions and so from
     /// both sides, starting between one and a half voxels and the size of the scene away. Half of the points
-    /// are spread by area, half fall on every connected part of a mesh alike. Fewer than `count` where nearly
-    /// all of the sheets' area lies at borders.
+    /// are spread by area, half fall on every connected part of a mesh alike; points serve several times
+    /// where most of the area lies at borders. Rays that rounding makes miss their triangle are left out, so
+    /// that each is one that must not pass. Empty where no point is off the borders.
     AimedRays aim(std::size_t count, std::uint32_t seed) const;
 
 private:
+    struct Target {
+        std::uint32_t instance = 0;
+        std::uint32_t triangle = 0;  ///< Of its SheetMesh.
+        glm::dvec3 point{0.0};       ///< Local.
+    };
+    std::vector<Target> targets(std::size_t count, TestRandom& random) const;
+
     /// One mesh's sheets, local units.
     struct SheetMesh {
         std::vector<sdf::Triangle> triangles;
@@ -55,10 +65,10 @@ private:
 /// What came of aimed rays.
 struct SheetPassages {
     std::size_t rays = 0;
-    std::size_t unconfirmed = 0;            ///< The judge meets nothing either up to a voxel past the point.
-    std::size_t passed = 0;                 ///< Of the others: met nothing up to a voxel past the point.
-    std::size_t unoccluded = 0;             ///< Likewise by the other query.
-    std::size_t early = 0;                  ///< Met something more than a voxel before the judge does.
+    std::size_t unconfirmed = 0;  ///< The judge, in floats, meets nothing up to a voxel past the point.
+    std::size_t passed = 0;       ///< Of the others: met nothing up to a voxel past the point.
+    std::size_t unoccluded = 0;   ///< Likewise by the other query.
+    std::size_t early = 0;        ///< Met something more than a voxel before the judge does.
     std::vector<std::size_t> first_passed;  ///< A few of those that passed.
 
     friend std::ostream& operator<<(std::ostream& stream, const SheetPassages& passages);
@@ -67,7 +77,7 @@ struct SheetPassages {
 /// Traces the rays through `tracer`, and through `judge` on the same triangles.
 SheetPassages count_passages(const AimedRays& aimed, const core::Tracer& tracer, const core::Tracer& judge);
 
-/// The scene with every material opaque: what is asked of is its shape alone.
+/// The scene with every material opaque: what is asked for is its shape alone.
 core::Scene without_alpha(core::Scene scene);
 
 }  // namespace tests
