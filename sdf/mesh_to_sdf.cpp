@@ -170,8 +170,10 @@ void find_signs(const Sources& sources, const FieldLeaf& leaf, const LeafDistanc
     }
 }
 
-/// Fills one leaf with signed distances in voxels and clean triangle numbers. Sheets keep their visible sides
-/// within solids too: there the field is the negative of what it is outside.
+/// Fills one leaf with signed distances in voxels and clean triangle numbers. Within solids all is negative,
+/// on both sides of a shell's face: a ray that has been inside looks for the sheets behind it where it comes
+/// out. Where a sheet lies in the opening of a solid, as a deck in a hull, one of its sides is inside; the
+/// field must be as deep there as on the other side, or the ray comes out before it has reached the sheet.
 void fill_leaf(const Sources& sources, FieldLeaf& leaf) {
     LeafDistances distances;
     measure_distances(sources, leaf, distances);
@@ -189,7 +191,8 @@ void fill_leaf(const Sources& sources, FieldLeaf& leaf) {
         const double magnitude =
             std::min(sheet_is_near ? shell : distances.solid[slot], static_cast<double>(kBandVoxels));
         // Inside stays inside: 0 counts as positive.
-        leaf.distance[slot] = static_cast<float>(inside[slot] ? -std::max(magnitude, kOnSurface) : magnitude);
+        leaf.distance[slot] =
+            static_cast<float>(inside[slot] ? -std::max(std::abs(magnitude), kOnSurface) : magnitude);
         leaf.triangle[slot] = static_cast<std::int32_t>(sheet_is_near ? distances.sheet_triangle[slot]
                                                                       : distances.solid_triangle[slot]);
     }

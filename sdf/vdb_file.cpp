@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of the files' layout and of what the samples mean; part of what decides whether a bake is used again.
-constexpr const char* kWriter = "fieldlight " FIELDLIGHT_VERSION " bake 4";
+constexpr const char* kWriter = "fieldlight " FIELDLIGHT_VERSION " bake 5";
 
 constexpr const char* kDistanceGrid = "distance";
 constexpr const char* kTriangleGrid = "triangle";
