@@ -20,7 +20,7 @@ constexpr int kSampleBytesY = 16, kSampleBytesX = 128, kLogBrickBytes = 10;
 /// Rays that have come to a cell near the surface, one column a component.
 struct Candidates {
     /// As many as are searched together, and what two packets may add to them.
-    static constexpr std::size_t kFull = 256, kCapacity = kFull + 2 * kMostLanes;
+    static constexpr std::size_t kFull = 256, kCapacity = kFull + 4 * kMostLanes;
 
     alignas(64) std::int32_t ray[kCapacity], brick[kCapacity], steps[kCapacity];
     alignas(64) float cx[kCapacity], cy[kCapacity], cz[kCapacity];
@@ -54,25 +54,26 @@ struct Candidates {
         __builtin_prefetch(corner);
         __builtin_prefetch(corner + kSampleBytesX / 2);
     }
-    /// Moves one to an earlier place.
-    HWY_INLINE HWY_ATTR void move(std::size_t from, std::size_t to) {
-        ray[to] = ray[from];
-        brick[to] = brick[from];
-        steps[to] = steps[from];
-        cx[to] = cx[from];
-        cy[to] = cy[from];
-        cz[to] = cz[from];
-        s[to] = s[from];
-        end[to] = end[from];
-        sign[to] = sign[from];
-        next_s[to] = next_s[from];
-        next_x[to] = next_x[from];
-        next_y[to] = next_y[from];
-        next_z[to] = next_z[from];
+    /// Moves the lanes of `mask` from one place to an earlier one.
+    HWY_INLINE HWY_ATTR void move(std::size_t from, std::size_t to, Mask mask) {
+        const auto of_floats = [&](float* column) HWY_ATTR {
+            hn::StoreU(hn::Compress(hn::Load(kFloat, column + from), mask), kFloat, column + to);
+        };
+        const auto of_ints = [&](std::int32_t* column) HWY_ATTR {
+            hn::StoreU(hn::Compress(hn::Load(kInt, column + from), hn::RebindMask(kInt, mask)), kInt,
+                       column + to);
+        };
+        for (std::int32_t* column : {ray, brick, steps}) of_ints(column);
+        for (float* column : {cx, cy, cz, s, end, sign, next_s, next_x, next_y, next_z}) of_floats(column);
     }
     /// Fills the last vector up with copies of the first.
     HWY_INLINE HWY_ATTR void pad() {
-        for (std::size_t i = size; i % hn::Lanes(kFloat) != 0; ++i) move(0, i);
+        for (std::size_t i = size; i % hn::Lanes(kFloat) != 0; ++i) {
+            for (std::int32_t* column : {ray, brick, steps}) column[i] = column[0];
+            for (float* column : {cx, cy, cz, s, end, sign, next_s, next_x, next_y, next_z}) {
+                column[i] = column[0];
+            }
+        }
     }
 };
 
@@ -230,33 +231,34 @@ HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, 
             hn::Store(next.x, kFloat, &candidates.cx[begin]);
             hn::Store(next.y, kFloat, &candidates.cy[begin]);
             hn::Store(next.z, kFloat, &candidates.cz[begin]);
-            const std::uint64_t found_bits = bits_of(hn::And(found, hn::Le(hit_s, length))),
-                                ended_bits = bits_of(found), on_bits = bits_of(goes_on);
             const std::size_t count = candidates.size - begin < lanes ? candidates.size - begin : lanes;
-            for (std::size_t lane = 0; lane < count; ++lane) {
+            const Mask is_there = hn::FirstN(kFloat, count), stays = hn::And(is_there, goes_on);
+            const Mask leaves = hn::AndNot(goes_on, is_there);
+            const Mask resumes = hn::AndNot(
+                found,
+                hn::And(leaves, hn::Lt(hn::Load(kFloat, &candidates.next_s[begin]), hn::Set(kFloat, kHuge))));
+            const std::uint64_t hit_bits = bits_of(hn::And(found, hn::Le(hit_s, length)));
+            for (std::uint64_t bits = bits_of(resumes); bits != 0; bits &= bits - 1) {
+                const std::size_t i = begin + static_cast<std::size_t>(__builtin_ctzll(bits));
+                resumed.push_back({static_cast<std::uint32_t>(candidates.ray[i]),
+                                   candidates.next_s[i],
+                                   {candidates.next_x[i], candidates.next_y[i], candidates.next_z[i]},
+                                   candidates.sign[i],
+                                   candidates.steps[i]});
+            }
+            for (std::uint64_t bits = bits_of(hn::AndNot(resumes, leaves)); bits != 0; bits &= bits - 1) {
+                const auto lane = static_cast<std::size_t>(__builtin_ctzll(bits));
                 const std::size_t i = begin + lane;
-                if (on_bits >> lane & 1) {
-                    candidates.move(i, kept++);
-                    continue;
-                }
-                const auto number = static_cast<std::uint32_t>(candidates.ray[i]);
-                if (!(ended_bits >> lane & 1) && candidates.next_s[i] < kHuge) {
-                    resumed.push_back({number,
-                                       candidates.next_s[i],
-                                       {candidates.next_x[i], candidates.next_y[i], candidates.next_z[i]},
-                                       candidates.sign[i],
-                                       candidates.steps[i]});
-                    continue;
-                }
-                MarchHit& hit = hits[number];
-                hit.distance = found_bits >> lane & 1 ? hit_at[lane] : 0.0f;
+                const bool is_hit = hit_bits >> lane & 1;
+                MarchHit& hit = hits[candidates.ray[i]];
+                hit.distance = is_hit ? hit_at[lane] : 0.0f;
                 hit.brick = candidates.brick[i];
                 hit.surface = 0;
                 for (int axis = 0; axis < 3; ++axis) {
                     hit.cell[axis] = static_cast<std::int16_t>(cell_at[axis][lane]);
                 }
-                hit.status = found_bits >> lane & 1 ? MarchStatus::kHit : MarchStatus::kMiss;
-                if (hit.status == MarchStatus::kHit) {
+                hit.status = is_hit ? MarchStatus::kHit : MarchStatus::kMiss;
+                if (is_hit) {
                     hit.surface = fields.bricks[hit.brick].entry(
                         hit.cell[0] % kBrickCells,
                         hit.cell[1] % kBrickCells * kBrickCells + hit.cell[2] % kBrickCells);
@@ -264,6 +266,10 @@ HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, 
                 }
                 hit.enters_negative = candidates.sign[i] > 0.0f;
                 hit.steps = static_cast<std::uint32_t>(candidates.steps[i]);
+            }
+            if (!hn::AllFalse(kFloat, stays)) {
+                candidates.move(begin, kept, stays);
+                kept += hn::CountTrue(kFloat, stays);
             }
         }
         candidates.size = kept;

@@ -27,7 +27,7 @@ SdfTracer::Surface SdfTracer::surface_found(const Work& work, std::size_t at,
     here.triangle = static_cast<std::uint32_t>(surface.triangle[at] - triangle_base);
     here.distance = std::sqrt(surface.distance_squared[at]);
     here.barycentrics = {surface.u[at], surface.v[at]};
-    here.is_front = surface.is_front[at] != 0;
+    here.is_front = surface.side[at] < 0.0f;
     here.gradient = {surface.gradient_x[at], surface.gradient_y[at], surface.gradient_z[at]};
     return here;
 }

@@ -28,6 +28,10 @@ HWY_INLINE HWY_ATTR Floats dot(const Vector& a, const Vector& b) {
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
+HWY_INLINE HWY_ATTR Vector cross(const Vector& a, const Vector& b) {
+    return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y};
+}
+
 /// a + s b
 HWY_INLINE HWY_ATTR Vector along(const Vector& a, Floats s, const Vector& b) {
     return {a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
@@ -169,6 +173,9 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
                           of_point(kFloat, points.y) - triangle.a.y,
                           of_point(kFloat, points.z) - triangle.a.z};
         const ClosestLanes found = closest_on_triangles(from, triangle.ab, triangle.ac);
+        const Vector direction{of_point(kFloat, points.direction_x), of_point(kFloat, points.direction_y),
+                               of_point(kFloat, points.direction_z)};
+        const Floats side = dot(direction, cross(triangle.ab, triangle.ac));
         Floats best;
         if constexpr (kFirst) {
             best = hn::IfThenElse(hn::RebindMask(kFloat, is_named), found.squared, hn::Set(kFloat, 1e30f));
@@ -176,6 +183,7 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
             hn::Store(best, kFloat, &points.distance_squared[i]);
             hn::Store(found.u, kFloat, &points.u[i]);
             hn::Store(found.v, kFloat, &points.v[i]);
+            hn::Store(side, kFloat, &points.side[i]);
         } else {
             best = of_point(kFloat, points.distance_squared);
             const Ints best_number = of_point(kInt, points.triangle);
@@ -192,6 +200,7 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
                 };
                 keep(found.u, points.u);
                 keep(found.v, points.v);
+                keep(side, points.side);
                 hn::ScatterIndex(hn::IfThenElse(hn::RebindMask(kInt, nearer), number, best_number), kInt,
                                  points.triangle.data(), point);
             }
@@ -208,19 +217,6 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
     return going_on;
 }
 
-HWY_INLINE HWY_ATTR void find_sides(const SurfaceTable& table, SurfacePoints& points) {
-    for (std::size_t i = 0; i < points.size(); i += hn::Lanes(kFloat)) {
-        const TriangleLanes triangle(table, hn::Max(hn::Load(kInt, &points.triangle[i]), hn::Zero(kInt)));
-        const Vector &b = triangle.ab, &c = triangle.ac;
-        const Vector normal{b.y * c.z - c.y * b.z, b.z * c.x - c.z * b.x, b.x * c.y - c.x * b.y};
-        const Vector direction{hn::Load(kFloat, &points.direction_x[i]),
-                               hn::Load(kFloat, &points.direction_y[i]),
-                               hn::Load(kFloat, &points.direction_z[i])};
-        const auto is_front = hn::RebindMask(kInt, hn::Lt(dot(direction, normal), hn::Zero(kFloat)));
-        hn::Store(hn::IfThenElseZero(is_front, hn::Set(kInt, 1)), kInt, &points.is_front[i]);
-    }
-}
-
 HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
     find_gradients(table, points);
     // No lane waits for another whose cell names more triangles: the first triangles of all, the second ones
@@ -234,7 +230,6 @@ HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
         }
         count = measure_triangles<false>(table, points, place, open, count);
     }
-    find_sides(table, points);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -291,7 +286,7 @@ void SurfacePoints::resize(std::size_t count) {
         ((columns.size() < room ? columns.resize(room) : void()), ...);
     };
     widen(x, y, z, direction_x, direction_y, direction_z, cell_x, cell_y, cell_z, cell, gradient_x,
-          gradient_y, gradient_z, triangle, u, v, distance_squared, is_front, work);
+          gradient_y, gradient_z, triangle, u, v, distance_squared, side, work);
     for (std::size_t i = count; i < room; ++i) {
         x[i] = y[i] = z[i] = direction_x[i] = direction_y[i] = direction_z[i] = 0.0f;
         cell_x[i] = cell_y[i] = cell_z[i] = 0.0f;

@@ -52,7 +52,7 @@ struct SurfacePoints {
         triangle;              ///< The closest of the cell's corners' triangles; -1: they name none.
     core::Column<float> u, v;  ///< Barycentrics of its closest point: second and third corner.
     core::Column<float> distance_squared;  ///< From that point, voxels.
-    core::Column<std::int32_t> is_front;   ///< Whether the ray comes from that triangle's front.
+    core::Column<float> side;              ///< Negative where the ray comes from that triangle's front.
 
     std::size_t size() const { return size_; }
     /// Padding is filled with crossings of the first cell.

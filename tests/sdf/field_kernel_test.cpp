@@ -200,7 +200,7 @@ TEST_P(FieldKernel, SurfacePointsAreTheClosestTrianglesAndTheMeanGradient) {
                 glm::dot(closest.corners.scaled_normal(),
                          glm::dvec3(points.direction_x[k], points.direction_y[k], points.direction_z[k]));
             if (static_cast<std::uint32_t>(points.triangle[k]) == closest.index && std::abs(facing) > 1e-6) {
-                EXPECT_EQ(points.is_front[k] != 0, facing < 0.0);
+                EXPECT_EQ(points.side[k] < 0.0f, facing < 0.0);
             }
             const glm::dvec3 u = glm::clamp(voxel - glm::dvec3(cell), 0.0, 1.0);
             const glm::dvec3 gradient = sdf::smooth_gradient(*grid_, cell, u);
