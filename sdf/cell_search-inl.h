@@ -20,7 +20,7 @@ constexpr int kSampleBytesY = 16, kSampleBytesX = 128, kLogBrickBytes = 10;
 /// Rays that have come to a cell near the surface, one column a component.
 struct Candidates {
     /// As many as are searched together, and what two packets may add to them.
-    static constexpr std::size_t kFull = 256, kCapacity = kFull + 4 * kMostLanes;
+    static constexpr std::size_t kFull = 256, kCapacity = kFull + 2 * kMostLanes;
 
     alignas(64) std::int32_t ray[kCapacity], brick[kCapacity], steps[kCapacity];
     alignas(64) float cx[kCapacity], cy[kCapacity], cz[kCapacity];
@@ -54,26 +54,16 @@ struct Candidates {
         __builtin_prefetch(corner);
         __builtin_prefetch(corner + kSampleBytesX / 2);
     }
-    /// Moves the lanes of `mask` from one place to an earlier one.
-    HWY_INLINE HWY_ATTR void move(std::size_t from, std::size_t to, Mask mask) {
-        const auto of_floats = [&](float* column) HWY_ATTR {
-            hn::StoreU(hn::Compress(hn::Load(kFloat, column + from), mask), kFloat, column + to);
-        };
-        const auto of_ints = [&](std::int32_t* column) HWY_ATTR {
-            hn::StoreU(hn::Compress(hn::Load(kInt, column + from), hn::RebindMask(kInt, mask)), kInt,
-                       column + to);
-        };
-        for (std::int32_t* column : {ray, brick, steps}) of_ints(column);
-        for (float* column : {cx, cy, cz, s, end, sign, next_s, next_x, next_y, next_z}) of_floats(column);
+    /// Copies one to another place.
+    HWY_INLINE HWY_ATTR void move(std::size_t from, std::size_t to) {
+        for (std::int32_t* column : {ray, brick, steps}) column[to] = column[from];
+        for (float* column : {cx, cy, cz, s, end, sign, next_s, next_x, next_y, next_z}) {
+            column[to] = column[from];
+        }
     }
     /// Fills the last vector up with copies of the first.
     HWY_INLINE HWY_ATTR void pad() {
-        for (std::size_t i = size; i % hn::Lanes(kFloat) != 0; ++i) {
-            for (std::int32_t* column : {ray, brick, steps}) column[i] = column[0];
-            for (float* column : {cx, cy, cz, s, end, sign, next_s, next_x, next_y, next_z}) {
-                column[i] = column[0];
-            }
-        }
+        for (std::size_t i = size; i % hn::Lanes(kFloat) != 0; ++i) move(0, i);
     }
 };
 
@@ -267,9 +257,8 @@ HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, 
                 hit.enters_negative = candidates.sign[i] > 0.0f;
                 hit.steps = static_cast<std::uint32_t>(candidates.steps[i]);
             }
-            if (!hn::AllFalse(kFloat, stays)) {
-                candidates.move(begin, kept, stays);
-                kept += hn::CountTrue(kFloat, stays);
+            for (std::uint64_t bits = bits_of(stays); bits != 0; bits &= bits - 1) {
+                candidates.move(begin + static_cast<std::size_t>(__builtin_ctzll(bits)), kept++);
             }
         }
         candidates.size = kept;

@@ -38,7 +38,6 @@ struct alignas(64) Packet {
     float cx[kMostLanes], cy[kMostLanes], cz[kMostLanes];
     float sign[kMostLanes];  ///< Of the field, +1 or -1, once the ray has come to a surface; 0 before.
     std::int32_t steps[kMostLanes];
-    std::int32_t step_cap[kMostLanes];
     // What fetch() found there.
     float block_x[kMostLanes], block_y[kMostLanes], block_z[kMostLanes];  ///< Lowest corner.
     std::int32_t brick[kMostLanes];                                       ///< Negative: the block is empty.
@@ -207,15 +206,18 @@ HWY_INLINE HWY_ATTR Ended advance(Packet& p) {
         }
     }
 
-    const Mask inside =
-        hn::And(hn::And(hn::And(hn::Ge(next_x, zero), hn::Lt(next_x, hn::Load(kFloat, p.count_x))),
-                        hn::And(hn::Ge(next_y, zero), hn::Lt(next_y, hn::Load(kFloat, p.count_y)))),
-                hn::And(hn::Ge(next_z, zero), hn::Lt(next_z, hn::Load(kFloat, p.count_z))));
+    const Floats count_x = hn::Load(kFloat, p.count_x), count_y = hn::Load(kFloat, p.count_y),
+                 count_z = hn::Load(kFloat, p.count_z);
+    const Mask inside = hn::And(hn::And(hn::And(hn::Ge(next_x, zero), hn::Lt(next_x, count_x)),
+                                        hn::And(hn::Ge(next_y, zero), hn::Lt(next_y, count_y))),
+                                hn::And(hn::Ge(next_z, zero), hn::Lt(next_z, count_z)));
     const Mask goes_on = hn::And(inside, hn::Lt(next, length));
     const Ints steps = hn::Load(kInt, p.steps) + hn::Set(kInt, 1);
     ended.gone = hn::Not(hn::Or(ended.at_surface, goes_on));
-    ended.exhausted = hn::AndNot(hn::Or(ended.at_surface, ended.gone),
-                                 hn::RebindMask(kFloat, hn::Gt(steps, hn::Load(kInt, p.step_cap))));
+    // More steps than this no ray needs, even from cell to cell.
+    const Floats most_steps = two * (count_x + count_y + count_z) + hn::Set(kFloat, 256.0f);
+    ended.exhausted =
+        hn::AndNot(hn::Or(ended.at_surface, ended.gone), hn::Gt(hn::ConvertTo(kFloat, steps), most_steps));
     hn::Store(steps, kInt, p.steps);
     // Where the ray does not go on, the place tells so.
     hn::Store(hn::IfThenElse(goes_on, next, hn::Set(kFloat, kHuge)), kFloat, p.s);
@@ -251,8 +253,6 @@ HWY_INLINE HWY_ATTR void load_lane(Packet& p, std::size_t lane, const MarchRay& 
     p.stride_x[lane] = ray.top_stride_x;
     p.stride_y[lane] = ray.top_stride_y;
     p.octant_boxes[lane] = octant * kRegions;
-    p.step_cap[lane] = static_cast<std::int32_t>(
-        2.0f * (ray.cell_count[0] + ray.cell_count[1] + ray.cell_count[2]) + 256.0f);
     p.s[lane] = 0.0f;
     const auto cell = [](float position, float count) {
         const auto whole = static_cast<float>(static_cast<std::int32_t>(position));
@@ -286,7 +286,6 @@ HWY_INLINE HWY_ATTR void idle_lane(Packet& p, std::size_t lane) {
     p.length[lane] = kHuge;
     p.count_x[lane] = p.count_y[lane] = p.count_z[lane] = kHuge;
     p.top_base[lane] = p.stride_x[lane] = p.stride_y[lane] = p.octant_boxes[lane] = 0;
-    p.step_cap[lane] = 0x7fffffff;
     p.s[lane] = p.cx[lane] = p.cy[lane] = p.cz[lane] = 0.0f;
     p.sign[lane] = 1.0f;
     p.steps[lane] = 0;

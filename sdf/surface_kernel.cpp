@@ -173,9 +173,6 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
                           of_point(kFloat, points.y) - triangle.a.y,
                           of_point(kFloat, points.z) - triangle.a.z};
         const ClosestLanes found = closest_on_triangles(from, triangle.ab, triangle.ac);
-        const Vector direction{of_point(kFloat, points.direction_x), of_point(kFloat, points.direction_y),
-                               of_point(kFloat, points.direction_z)};
-        const Floats side = dot(direction, cross(triangle.ab, triangle.ac));
         Floats best;
         if constexpr (kFirst) {
             best = hn::IfThenElse(hn::RebindMask(kFloat, is_named), found.squared, hn::Set(kFloat, 1e30f));
@@ -183,7 +180,6 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
             hn::Store(best, kFloat, &points.distance_squared[i]);
             hn::Store(found.u, kFloat, &points.u[i]);
             hn::Store(found.v, kFloat, &points.v[i]);
-            hn::Store(side, kFloat, &points.side[i]);
         } else {
             best = of_point(kFloat, points.distance_squared);
             const Ints best_number = of_point(kInt, points.triangle);
@@ -200,7 +196,6 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
                 };
                 keep(found.u, points.u);
                 keep(found.v, points.v);
-                keep(side, points.side);
                 hn::ScatterIndex(hn::IfThenElse(hn::RebindMask(kInt, nearer), number, best_number), kInt,
                                  points.triangle.data(), point);
             }
@@ -217,6 +212,16 @@ HWY_INLINE HWY_ATTR std::size_t measure_triangles(const SurfaceTable& table, Sur
     return going_on;
 }
 
+HWY_INLINE HWY_ATTR void find_sides(const SurfaceTable& table, SurfacePoints& points) {
+    for (std::size_t i = 0; i < points.size(); i += hn::Lanes(kFloat)) {
+        const TriangleLanes triangle(table, hn::Max(hn::Load(kInt, &points.triangle[i]), hn::Zero(kInt)));
+        const Vector direction{hn::Load(kFloat, &points.direction_x[i]),
+                               hn::Load(kFloat, &points.direction_y[i]),
+                               hn::Load(kFloat, &points.direction_z[i])};
+        hn::Store(dot(direction, cross(triangle.ab, triangle.ac)), kFloat, &points.side[i]);
+    }
+}
+
 HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
     find_gradients(table, points);
     // No lane waits for another whose cell names more triangles: the first triangles of all, the second ones
@@ -230,6 +235,7 @@ HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
         }
         count = measure_triangles<false>(table, points, place, open, count);
     }
+    find_sides(table, points);
 }
 
 }  // namespace HWY_NAMESPACE
