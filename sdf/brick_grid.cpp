@@ -45,18 +45,6 @@ LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf, float zero_be
     return occupied;
 }
 
-/// The cells of a brick that hold a crossing lie within [first, end).
-CellBox occupied_box(const Brick& brick) {
-    CellBox box{glm::ivec3(kBrickCells), glm::ivec3(0)};
-    for (int cell = 0; cell < kBrickCells * kBrickCells * kBrickCells; ++cell) {
-        const glm::ivec3 position(cell / 49, cell / 7 % 7, cell % 7);
-        if (!brick.is_occupied(position.x, position.y, position.z)) continue;
-        box.first = glm::min(box.first, position);
-        box.end = glm::max(box.end, position + 1);
-    }
-    return box;
-}
-
 /// Gives samples that the band does not hold the sign of their neighbours, in waves from those it holds.
 /// @param farthest sample that there is
 void fill_unknown(std::array<std::int16_t, kBrickSize>& sample, std::bitset<kBrickSize> is_known,
@@ -91,6 +79,17 @@ std::int64_t gap_squared(int offset) {
 }
 
 }  // namespace
+
+CellBox occupied_box(const Brick& brick) {
+    CellBox box{glm::ivec3(kBrickCells), glm::ivec3(0)};
+    for (int cell = 0; cell < kBrickCells * kBrickCells * kBrickCells; ++cell) {
+        const glm::ivec3 position(cell / 49, cell / 7 % 7, cell % 7);
+        if (!brick.is_occupied(position.x, position.y, position.z)) continue;
+        box.first = glm::min(box.first, position);
+        box.end = glm::max(box.end, position + 1);
+    }
+    return box;
+}
 
 std::int16_t stored_sample(float voxels, SampleBits bits) {
     const int unit = bits == SampleBits::k8 ? kCoarseSteps : 1;

@@ -65,6 +65,9 @@ struct Brick {
     bool is_occupied(int x, int y, int z) const { return (occupied[x] >> (kBrickCells * y + z)) & 1; }
 };
 
+/// The least box of a brick's occupied cells.
+CellBox occupied_box(const Brick& brick);
+
 /// An immutable field ready for tracing. Voxel coordinates: sample (i, j, k) lies at (i, j, k), and block
 /// (0, 0, 0) starts at 0; all coordinates inside the grid are >= 0.
 class BrickGrid {

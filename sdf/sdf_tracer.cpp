@@ -8,6 +8,7 @@
 
 #include "core/support/parallel.h"
 #include "core/trace/surface.h"
+#include "sdf/instance_bounds.h"
 #include "sdf/sdf_tracer_work.h"
 #include "sdf/transform_scale.h"
 
@@ -83,6 +84,7 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
     placed_.resize(scene.instances.size());
     placements_.resize(scene.instances.size());
     hit_placements_.resize(scene.instances.size());
+    std::vector<std::vector<core::DoubleBounds>> surfaces(grids_.size());
     for (std::size_t i = 0; i < scene.instances.size(); ++i) {
         const core::Instance& instance = scene.instances[i];
         const BrickGrid* grid = grids_[instance.mesh].get();
@@ -102,7 +104,9 @@ SdfTracer::SdfTracer(const core::Scene& scene, std::vector<std::shared_ptr<const
         placed.world_from_voxel_scale = largest_singular_value(glm::dmat3(instance.world_from_local)) * h;
         placements_[i] = placement_of(placed);
         hit_placements_[i] = hit_placement_of(placed);
-        boxes[i] = core::transformed(grid->local_bounds(), instance.world_from_local);
+        std::vector<core::DoubleBounds>& surface = surfaces[instance.mesh];
+        if (surface.empty()) surface = surface_boxes(*grid);
+        boxes[i] = world_bounds(surface, instance.world_from_local);
         const double reach = glm::length(glm::max(glm::abs(boxes[i].minimum), glm::abs(boxes[i].maximum)));
         placed.start_offset = static_cast<float>(
             surface_offset_voxels(*grid) * placed.world_from_voxel_scale + four_ulp(reach));
