@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <unordered_map>
 #include <unordered_set>
@@ -60,6 +61,9 @@ CleanMesh clean_mesh(const MeshView& mesh) {
     std::unordered_map<BitKey, std::uint32_t, BitKeyHash> vertex_of_position;
     std::unordered_set<BitKey, BitKeyHash> faces;
     vertex_of_position.reserve(mesh.positions.size());
+    // Six triangles share a vertex: each position is looked up once.
+    constexpr std::uint32_t kNotYet = std::numeric_limits<std::uint32_t>::max();
+    std::vector<std::uint32_t> vertex_of_index(mesh.positions.size(), kNotYet);
     faces.reserve(mesh.triangles.size());
     for (std::uint32_t source = 0; source < mesh.triangles.size(); ++source) {
         const glm::uvec3& corners = mesh.triangles[source];
@@ -80,10 +84,14 @@ CleanMesh clean_mesh(const MeshView& mesh) {
         }
         glm::uvec3 welded;
         for (int i = 0; i < 3; ++i) {
-            const auto [entry, is_new] = vertex_of_position.try_emplace(
-                key_of(p[i]), static_cast<std::uint32_t>(clean.vertices.size()));
-            if (is_new) clean.vertices.emplace_back(p[i]);
-            welded[i] = entry->second;
+            std::uint32_t& vertex = vertex_of_index[corners[i]];
+            if (vertex == kNotYet) {
+                const auto [entry, is_new] = vertex_of_position.try_emplace(
+                    key_of(p[i]), static_cast<std::uint32_t>(clean.vertices.size()));
+                if (is_new) clean.vertices.emplace_back(p[i]);
+                vertex = entry->second;
+            }
+            welded[i] = vertex;
         }
         std::array<std::uint32_t, 3> sorted{welded.x, welded.y, welded.z};
         std::sort(sorted.begin(), sorted.end());
