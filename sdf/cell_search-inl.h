@@ -13,6 +13,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 /// Bytes from a sample to its neighbours along y and x, and from brick to brick.
 constexpr int kSampleBytesY = 16, kSampleBytesX = 128, kLogBrickBytes = 10;
@@ -265,6 +266,7 @@ HWY_INLINE HWY_ATTR void search(const FieldTable& fields, const MarchRay* rays, 
     }
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

@@ -9,6 +9,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -135,6 +136,7 @@ HWY_ATTR void enter_fields(const core::RayStream& rays, const FieldPlacement* pl
     }
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

@@ -14,6 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -138,6 +139,7 @@ HWY_INLINE HWY_ATTR Floats first_root(const CubicLanes& cubic, Mask negative, Ma
     return s;
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

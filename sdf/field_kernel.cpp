@@ -16,6 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 /// What a ray is that met nothing.
 HWY_INLINE HWY_ATTR void store_end(const Packet& p, std::size_t lane, MarchStatus status, MarchHit& hit) {
@@ -102,6 +103,7 @@ HWY_ATTR void march_rays_cubic(const FieldTable& fields, const MarchRay* rays, M
     march_all<HitMode::kCubic>(fields, rays, hits, count);
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

@@ -13,6 +13,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 /// Where a ray goes on that was held up by a piece of surface it does not meet.
 struct Resumed {
@@ -293,6 +294,7 @@ HWY_INLINE HWY_ATTR void idle_lane(Packet& p, std::size_t lane) {
     p.is_busy[lane] = false;
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

@@ -11,6 +11,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -164,6 +165,7 @@ HWY_ATTR void finish_hits(const core::RayStream& rays, std::size_t begin, std::s
 
 #undef FIELDLIGHT_WORD
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

@@ -10,6 +10,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -71,6 +72,7 @@ HWY_ATTR void find_next(InstanceTree::Walk* walks, const std::uint32_t* slots, s
     }
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

@@ -9,6 +9,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -238,6 +239,7 @@ HWY_ATTR void find_surface(const SurfaceTable& table, SurfacePoints& points) {
     find_sides(table, points);
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();

@@ -15,6 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sdf {
 namespace HWY_NAMESPACE {
+namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -240,6 +241,7 @@ HWY_ATTR void hit_triangles(TriangleQuery* queries, std::size_t count) {
     }
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sdf
 HWY_AFTER_NAMESPACE();
