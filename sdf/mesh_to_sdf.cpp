@@ -198,7 +198,7 @@ void fill_leaf(const Sources& sources, FieldLeaf& leaf) {
     }
 }
 
-/// Adds a shell of the half-thickness round walls that the lattice misses.
+/// Adds a shell of the half-thickness round what the lattice cannot hold.
 void thicken(const ThinWalls& walls, std::vector<FieldLeaf>& leaves) {
     std::vector<std::uint32_t> all(walls.pieces.size());
     std::iota(all.begin(), all.end(), 0u);
@@ -364,8 +364,11 @@ SampledField bake_mesh(const MeshView& mesh, const MeshBakeOptions& options) {
     }
     bool has_thin_walls = false;
     if (sources.has_solids) {
-        const ThinWalls walls = find_thin_walls(sources.corners, components, *sources.solids,
-                                                *sources.winding, LeafMap(field.leaves));
+        ThinWalls walls = find_thin_walls(sources.corners, components, *sources.solids, *sources.winding,
+                                          LeafMap(field.leaves));
+        if (!sources.solids_are_closed) {
+            add_pieces(sources.corners, find_rims(sources.is_sheet, field.leaves), walls);
+        }
         has_thin_walls = !walls.pieces.empty();
         if (has_thin_walls) {
             thicken(walls, field.leaves);

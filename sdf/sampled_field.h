@@ -43,7 +43,8 @@ std::string_view class_name(MeshClass value);
 enum class Feature : std::uint8_t {
     kSurface,   ///< By the zero of its signed distance.
     kSheet,     ///< By its distance less the half-thickness.
-    kThinWall,  ///< In part or whole like a sheet: it bounds a solid too thin for the lattice there.
+    kThinWall,  ///< In part or whole like a sheet: it bounds a solid too thin for the lattice there, or a
+                ///< hole.
 };
 
 /// Distances between the mesh and the trilinear surface of its field, in voxels, over area-uniform samples.

@@ -179,7 +179,7 @@ void SdfTracer::march_active(bool any, Work& work) const {
             // Only a ray that both starts and ends within the field's box may be in a shell all the way.
             if (placed.triangles && traced.may_end_inside()) {
                 LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
-                if (traced.passage.t_min <= local.world.t_min) end_without_crossing(local, false, work);
+                if (traced.passage.t_min <= local.world.t_min) end_without_crossing(local, work);
             }
         } else if (any && placed.is_opaque_solid) {
             traced.nearest.t = t;

@@ -118,12 +118,15 @@ private:
     /// The end of a passage: within a shell it may meet a triangle yet.
     void ask_at_end(LocalRay& ray, Work& work) const;
     /// The same from a place behind which there is no crossing.
-    /// @param if_unknown whether the ray is inside where the field does not say
-    void end_without_crossing(LocalRay& ray, bool if_unknown, Work& work) const;
+    void end_without_crossing(LocalRay& ray, Work& work) const;
+    /// Whether the field is negative at a place along the ray, or does not say.
+    static bool may_be_inside(const LocalRay& ray, double t);
     Surface surface_found(const Work& work, std::size_t at, std::int32_t triangle_base) const;
     /// The normal that faces the ray: of the triangle itself, or of the field.
     glm::vec3 triangle_side(const core::Ray& ray, const NearestHit& nearest) const;
     glm::vec3 field_side(const core::Ray& ray, const NearestHit& nearest) const;
+    /// Whether a point of a triangle lies so deep in a shell that no field passes there.
+    bool is_within_shell(const NearestHit& nearest, const glm::vec3& position) const;
     core::Hit finish(const core::Ray& ray, const NearestHit& nearest) const;
 
     const core::Scene& scene_;

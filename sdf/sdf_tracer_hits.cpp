@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sdf/distance.h"
 #include "sdf/sdf_tracer.h"
 #include "sdf/sdf_tracer_work.h"
 #include "sdf/sphere_trace.h"
@@ -62,6 +63,8 @@ void SdfTracer::finish_crossing(std::size_t at, bool any, Work& work) const {
         keep_nearer(found, traced);
     } else {
         LocalRay local = local_ray(work.ray(slot), slot, traced, any);
+        const bool starts_in_box = passage.t_min <= local.world.t_min;
+        local.is_inside = placed.triangles && starts_in_box && may_be_inside(local, passage.t_min);
         take_crossing(local, crossing, here, work);
     }
 }
@@ -102,6 +105,13 @@ glm::vec3 SdfTracer::field_side(const core::Ray& ray, const NearestHit& nearest)
     return normal;
 }
 
+bool SdfTracer::is_within_shell(const NearestHit& nearest, const glm::vec3& position) const {
+    constexpr double kWithinShellVoxels = 0.3;
+    const PlacedGrid& placed = placed_[nearest.instance];
+    const glm::dvec3 voxel = placed.voxel_from_world_direction * glm::dvec3(position) + placed.voxel_origin;
+    return distance_at(*placed.grid, voxel).value_or(-1.0) < -kWithinShellVoxels;
+}
+
 core::Hit SdfTracer::finish(const core::Ray& ray, const NearestHit& nearest) const {
     core::Hit hit;
     hit.status = core::HitStatus::kHit;
@@ -113,7 +123,8 @@ core::Hit SdfTracer::finish(const core::Ray& ray, const NearestHit& nearest) con
     hit.front = nearest.is_front;
     const glm::vec3 position = ray.origin + hit.t * ray.direction;
     const float magnitude = std::max({glm::length(position), glm::length(ray.origin), hit.t});
-    const double clearance_voxels = nearest.is_triangle ? 0.0 : kSurfaceClearanceVoxels;
+    const double clearance_voxels =
+        nearest.is_triangle && is_within_shell(nearest, position) ? 0.0 : kSurfaceClearanceVoxels;
     hit.offset = static_cast<float>(
         std::max(clearance_voxels * placed_[nearest.instance].world_from_voxel_scale, four_ulp(magnitude)));
     return hit;

@@ -19,11 +19,15 @@ namespace {
 
 /// Next to a thickened surface the shell covers plain ones as well. A crossing farther than this from its
 /// triangle lies on a shell: plain surfaces are nearer than 0.2 voxels.
-constexpr double kShellVoxels = 0.25;
+constexpr double kShellVoxels = 0.1;
 
 /// How far beyond the place where a ray comes into a shell its triangles are looked for at once. Whatever
 /// lies farther is looked for where the ray leaves the shell.
 constexpr double kShellPassageVoxels = 8.0;
+
+/// How far beyond the place where a ray comes out its triangles are looked for: where no shell is, the field
+/// of a solid may end before its triangles do.
+constexpr double kExitVoxels = 0.5;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -66,19 +70,24 @@ void SdfTracer::take_sheet(LocalRay& ray, const Crossing& crossing, Work& work) 
 void SdfTracer::take_crossing(LocalRay& ray, const Crossing& crossing, const Surface& here,
                               Work& work) const {
     ray.come_to = crossing.t;
+    // A ray that comes in though it was inside has left through a lid far from all samples, unseen.
+    const bool was_inside = ray.is_inside || !crossing.enters_negative;
     ray.is_inside = crossing.enters_negative;
     const Stands stands = stands_for(ray.placed, here);
+    const IfUnmet if_unmet = stands == Stands::kSurface ? IfUnmet::kTakeSurface : IfUnmet::kGoOn;
     const double voxel = work.traced[ray.slot].passage.t_per_voxel;
-    if (ray.placed.triangles && !crossing.enters_negative) {
+    const double ahead = !crossing.enters_negative  ? kExitVoxels
+                         : stands == Stands::kShell ? kShellPassageVoxels
+                                                    : 0.0;
+    if (ray.placed.triangles && was_inside) {
         // The ray was inside a shell, or inside a solid that a shell runs into.
-        ask(ray, ray.unmet_since, crossing.t, here,
-            stands == Stands::kSurface ? IfUnmet::kTakeSurface : IfUnmet::kGoOn, work);
+        ask(ray, ray.unmet_since, crossing.t + ahead * voxel, here, if_unmet, work);
     } else if (stands == Stands::kShell) {
         // The field of a plain surface next to the shell may lie behind its triangles.
         ask(ray, std::max(ray.unmet_since, crossing.t - kFarthestTriangleVoxels * voxel),
-            crossing.t + kShellPassageVoxels * voxel, here, IfUnmet::kGoOn, work);
+            crossing.t + ahead * voxel, here, IfUnmet::kGoOn, work);
     } else {
-        settle(ray, here, stands == Stands::kSurface ? IfUnmet::kTakeSurface : IfUnmet::kGoOn, work);
+        settle(ray, here, if_unmet, work);
     }
 }
 
@@ -184,10 +193,16 @@ void SdfTracer::ask_at_end(LocalRay& ray, Work& work) const {
     ask(ray, ray.unmet_since, work.traced[ray.slot].passage.t_max, {}, IfUnmet::kEnd, work);
 }
 
-void SdfTracer::end_without_crossing(LocalRay& ray, bool if_unknown, Work& work) const {
-    const glm::dvec3 position = ray.origin + ray.come_to * ray.direction;
-    ray.is_inside = distance_at(*ray.placed.grid, position).value_or(if_unknown ? -1.0 : 1.0) < 0.0;
+void SdfTracer::end_without_crossing(LocalRay& ray, Work& work) const {
+    ray.is_inside =
+        may_be_inside(ray, ray.come_to) && may_be_inside(ray, work.traced[ray.slot].passage.t_max);
     ask_at_end(ray, work);
+}
+
+bool SdfTracer::may_be_inside(const LocalRay& ray, double t) {
+    // Far from all surfaces nothing says so; but no sheet has an inside there.
+    const std::optional<double> value = distance_at(*ray.placed.grid, ray.origin + t * ray.direction);
+    return value ? *value < 0.0 : !ray.placed.is_sheet;
 }
 
 void SdfTracer::go_on(Work& work) const {
@@ -213,7 +228,7 @@ void SdfTracer::go_on(Work& work) const {
             const Crossing crossing = crossing_of(march_hit, ray.come_to, traced.passage);
             if (march_hit.status != MarchStatus::kHit || !(crossing.t <= traced.passage.t_max)) {
                 // It may have left the shell where the triangles had answered.
-                if (ray.is_inside && traced.may_end_inside()) end_without_crossing(ray, true, work);
+                if (ray.is_inside && traced.may_end_inside()) end_without_crossing(ray, work);
             } else {
                 work.met.push_back(static_cast<std::uint32_t>(i));
             }

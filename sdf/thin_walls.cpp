@@ -59,6 +59,27 @@ void cut(const Triangle& triangle, std::vector<Piece>& pieces) {
     }
 }
 
+/// A lid farther than this from every triangle, in voxels, is none for a ray.
+constexpr double kNearLid = 2.5;
+
+/// Adds the triangles next to an edge of the lattice that a lid crosses: whose ends lie on different sides
+/// though they are farther from the solid's surface than a surface between them can be.
+void add_lid(const std::vector<std::uint8_t>& is_sheet, const FieldLeaf& leaf, int i, const FieldLeaf& other,
+             int j, std::vector<std::uint32_t>& rims) {
+    constexpr double kSpacing = 1.0 + 1e-3;
+    const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
+    const double here = leaf.distance[a], there = other.distance[b];
+    if ((here < 0.0) == (there < 0.0)) return;
+    const auto solid_distance = [&](double value, std::int32_t triangle) {
+        return triangle < 0 || is_sheet[static_cast<std::size_t>(triangle)] ? 0.0 : std::abs(value);
+    };
+    const double near = solid_distance(here, leaf.triangle[a]),
+                 far = solid_distance(there, other.triangle[b]);
+    if (near + far <= kSpacing) return;
+    if (near > 0.0 && near < kNearLid) rims.push_back(static_cast<std::uint32_t>(leaf.triangle[a]));
+    if (far > 0.0 && far < kNearLid) rims.push_back(static_cast<std::uint32_t>(other.triangle[b]));
+}
+
 }  // namespace
 
 ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vector<Component>& components,
@@ -138,6 +159,44 @@ ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vecto
         result.edge_area_fraction = edge_area / total_area;
     }
     return result;
+}
+
+std::vector<std::uint32_t> find_rims(const std::vector<std::uint8_t>& is_sheet,
+                                     const std::vector<FieldLeaf>& leaves) {
+    const LeafMap map(leaves);
+    std::vector<std::vector<std::uint32_t>> found(leaves.size());
+    core::parallel_for(leaves.size(), 4, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t number = begin; number < end; ++number) {
+            const FieldLeaf& leaf = leaves[number];
+            for (int i = 0; i < kLeafSize; ++i) {
+                if (!leaf.is_active(i)) continue;
+                const glm::ivec3 position = leaf.origin + glm::ivec3(i / 64, i / 8 % 8, i % 8);
+                for (int axis = 0; axis < 3; ++axis) {
+                    glm::ivec3 next = position;
+                    ++next[axis];
+                    const FieldLeaf* other = map.find(next);
+                    const int j = LeafMap::offset_in_leaf(next);
+                    if (other && other->is_active(j)) add_lid(is_sheet, leaf, i, *other, j, found[number]);
+                }
+            }
+        }
+    });
+    std::vector<std::uint32_t> rims;
+    for (const auto& of_leaf : found) rims.insert(rims.end(), of_leaf.begin(), of_leaf.end());
+    std::sort(rims.begin(), rims.end());
+    rims.erase(std::unique(rims.begin(), rims.end()), rims.end());
+    return rims;
+}
+
+void add_pieces(const std::vector<Triangle>& corners, const std::vector<std::uint32_t>& triangles,
+                ThinWalls& walls) {
+    std::vector<Piece> pieces;
+    for (const std::uint32_t triangle : triangles) {
+        pieces.clear();
+        cut(corners[triangle], pieces);
+        for (const Piece& piece : pieces) walls.pieces.push_back(piece.triangle);
+        walls.triangle_of_piece.insert(walls.triangle_of_piece.end(), pieces.size(), triangle);
+    }
 }
 
 }  // namespace sdf

@@ -1,4 +1,4 @@
-// sdf/thin_walls.h: parts of solids that the lattice cannot hold, and how thin they are.
+// sdf/thin_walls.h: parts of solids that the lattice cannot hold: walls that are too thin, and rims of holes.
 //
 // A wall thinner than the spacing of samples can pass between them and vanish. What the field misses is found
 // by asking it: the middle of every wall must be inside.
@@ -39,5 +39,17 @@ inline constexpr double kSafeThickness = 2.0;
 /// not yet thickened by thin walls.
 ThinWalls find_thin_walls(const std::vector<Triangle>& corners, const std::vector<Component>& components,
                           const TriangleBvh& solids, const WindingNumber& winding, const LeafMap& field);
+
+/// Triangles beside holes of open solids. The winding number closes a hole with a lid, a change of sign away
+/// from any triangle, which looks like a surface where it comes close to one.
+/// @param is_sheet one entry a triangle; @param leaves distances in voxels, nothing thickened by thin walls
+/// yet.
+/// @returns ascending
+std::vector<std::uint32_t> find_rims(const std::vector<std::uint8_t>& is_sheet,
+                                     const std::vector<FieldLeaf>& leaves);
+
+/// Adds whole triangles to what is to be thickened.
+void add_pieces(const std::vector<Triangle>& corners, const std::vector<std::uint32_t>& triangles,
+                ThinWalls& walls);
 
 }  // namespace sdf

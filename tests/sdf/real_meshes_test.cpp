@@ -111,6 +111,34 @@ core::Mesh hull_with_deck(double below) {
                                                           rotation(0.5 * kPi, glm::dvec3(1, 0, 0))));
 }
 
+TEST(Rims, AHoleIsAsWideAsItsTrianglesLeaveIt) {
+    core::Mesh mesh = box({0.5f, 0.5f, 0.5f});
+    std::erase_if(mesh.triangles, [&](const glm::uvec3& corner) {
+        return mesh.positions[corner.x].y > 0.0f && mesh.positions[corner.y].y > 0.0f &&
+               mesh.positions[corner.z].y > 0.0f;
+    });
+    const BakedSheet open(scene_of(make_mesh("open box", mesh.positions, mesh.normals, {}, mesh.triangles)));
+    ASSERT_EQ(open.grids[0]->info().mesh_class, sdf::MeshClass::kSolid);
+    const double h = open.grids[0]->voxel_size();
+    TestRandom random(5);
+    std::vector<core::Ray> rays;
+    for (int i = 0; i < 10'000; ++i) {
+        // Down through the opening, where the winding number's lid lies within two voxels of a wall.
+        const glm::dvec3 through(0.5 - h * random.uniform(0.05, 2.0), 0.5, random.uniform(-0.4, 0.4));
+        const glm::dvec3 direction = random.cosine_direction({0.0, -1.0, 0.0});
+        rays.push_back(make_ray(through - direction, direction));
+    }
+    const core::RayStream stream = stream_of(rays);
+    core::HitStream ours, theirs;
+    sdf::SdfTracer(open.scene, open.grids).trace_closest(stream, ours);
+    core::TriangleTracer(open.scene).trace_closest(stream, theirs);
+    std::size_t off = 0;
+    for (std::size_t i = 0; i < stream.size(); ++i) {
+        off += !ours.get(i).hit() || std::abs(ours.t[i] - theirs.t[i]) > h;
+    }
+    EXPECT_EQ(off, 0u);
+}
+
 TEST(SheetRays, NonePassesADeckInTheOpeningOfAHull) {
     // The deck's sides lie on either side of where the winding number closes the hull, or it lies inside, and
     // always differently between samples.

@@ -32,8 +32,13 @@ SignCount count_wrong_signs(const sdf::SampledField& field, const core::Mesh& tr
         bool is_negative;
     };
     std::vector<Sample> samples;
-    for_each_sample(field, [&](const glm::dvec3& position, float value, std::int32_t) {
+    for_each_sample(field, [&](const glm::dvec3& position, float value, std::int32_t triangle) {
         if (std::abs(value) <= clear * field.info.voxel_size) return;
+        // Within the shell of a hole's rim or of a thin wall a sample has no side.
+        if (value < 0.0f && !field.features.empty() &&
+            field.features[static_cast<std::size_t>(triangle)] != sdf::Feature::kSurface) {
+            return;
+        }
         if (!counts || counts(position)) samples.push_back({position, value < 0.0f});
     });
     std::vector<std::uint8_t> wrong(samples.size());
