@@ -176,10 +176,10 @@ void SdfTracer::march_active(bool any, Work& work) const {
         if (march_hit.status == MarchStatus::kExhausted) traced.is_exhausted = true;
         const double t = traced.passage.t_at(march_hit);
         if (march_hit.status != MarchStatus::kHit || !(t <= traced.passage.t_max)) {
-            // Only a ray that both starts and ends within the field's box may be in a shell all the way.
-            if (placed.triangles && traced.may_end_inside()) {
+            // A ray that comes from outside the field's box is in no shell.
+            if (placed.triangles) {
                 LocalRay local = local_ray(work.ray(work.active[i]), work.active[i], traced, any);
-                if (traced.passage.t_min <= local.world.t_min) end_without_crossing(local, work);
+                if (traced.passage.t_min <= local.world.t_min) ask_at_end(local, work);
             }
         } else if (any && placed.is_opaque_solid) {
             traced.nearest.t = t;

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -115,10 +116,9 @@ private:
     bool take_triangle(const LocalRay& ray, const TriangleQuery& query, Work& work) const;
     /// What becomes of a ray that has met no triangle.
     void settle(LocalRay& ray, const Surface& here, IfUnmet if_unmet, Work& work) const;
-    /// The end of a passage: within a shell it may meet a triangle yet.
+    /// The end of a passage behind whose place there is no crossing: within a shell it may meet a triangle
+    /// yet.
     void ask_at_end(LocalRay& ray, Work& work) const;
-    /// The same from a place behind which there is no crossing.
-    void end_without_crossing(LocalRay& ray, Work& work) const;
     /// Whether the field is negative at a place along the ray, or does not say.
     static bool may_be_inside(const LocalRay& ray, double t);
     Surface surface_found(const Work& work, std::size_t at, std::int32_t triangle_base) const;

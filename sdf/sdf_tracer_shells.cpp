@@ -189,14 +189,14 @@ void SdfTracer::settle(LocalRay& ray, const Surface& here, IfUnmet if_unmet, Wor
 }
 
 void SdfTracer::ask_at_end(LocalRay& ray, Work& work) const {
-    if (!ray.placed.triangles || !ray.is_inside || !work.traced[ray.slot].may_end_inside()) return;
-    ask(ray, ray.unmet_since, work.traced[ray.slot].passage.t_max, {}, IfUnmet::kEnd, work);
-}
-
-void SdfTracer::end_without_crossing(LocalRay& ray, Work& work) const {
-    ray.is_inside =
-        may_be_inside(ray, ray.come_to) && may_be_inside(ray, work.traced[ray.slot].passage.t_max);
-    ask_at_end(ray, work);
+    // No crossing parts this place from the end, so that one sign should hold; but a lid far from all samples
+    // is passed unseen. Where the triangles had answered, the ray may have left the shell.
+    const Traced& traced = work.traced[ray.slot];
+    if (!ray.placed.triangles) return;
+    if (may_be_inside(ray, ray.come_to) ||
+        (traced.may_end_inside() && may_be_inside(ray, traced.passage.t_max))) {
+        ask(ray, ray.unmet_since, traced.passage.t_max, {}, IfUnmet::kEnd, work);
+    }
 }
 
 bool SdfTracer::may_be_inside(const LocalRay& ray, double t) {
@@ -227,8 +227,7 @@ void SdfTracer::go_on(Work& work) const {
             traced.is_exhausted = traced.is_exhausted || march_hit.status == MarchStatus::kExhausted;
             const Crossing crossing = crossing_of(march_hit, ray.come_to, traced.passage);
             if (march_hit.status != MarchStatus::kHit || !(crossing.t <= traced.passage.t_max)) {
-                // It may have left the shell where the triangles had answered.
-                if (ray.is_inside && traced.may_end_inside()) end_without_crossing(ray, work);
+                ask_at_end(ray, work);
             } else {
                 work.met.push_back(static_cast<std::uint32_t>(i));
             }
