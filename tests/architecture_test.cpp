@@ -104,8 +104,14 @@ std::vector<std::string> include_errors(const Source& source) {
 std::vector<std::string> form_errors(const Source& source) {
     std::vector<std::string> errors;
     const bool header = source.path.ends_with(".h");
+    // To the linker two kernels' functions of one name and instruction set are one.
+    if (source.text.find("namespace HWY_NAMESPACE {") != std::string::npos &&
+        source.text.find("namespace HWY_NAMESPACE {\nnamespace {") == std::string::npos) {
+        errors.push_back(source.path + ": a kernel's names belong into an unnamed namespace");
+    }
     const auto lines = std::count(source.text.begin(), source.text.end(), '\n');
-    const long limit = header ? 220 : 550;
+    // The sources of kernels are included once for each instruction set.
+    const long limit = header && !source.path.ends_with("-inl.h") ? 220 : 550;
     if (lines > limit && first_folder(source.path) != "tests") {
         errors.push_back(source.path + ": " + std::to_string(lines) + " lines; split it by responsibility");
     }
@@ -180,6 +186,8 @@ TEST(ArchitectureChecker, SeesEachFaultOfForm) {
     EXPECT_EQ(form_errors({"sdf/a.h", "// sdf/a.h: a thing.\n"}).size(), 1u);
     EXPECT_EQ(form_errors({"sdf/a.h", good + std::string(300, '\n')}).size(), 1u);
     EXPECT_EQ(form_errors({"sdf/a.cpp", std::string(551, '\n')}).size(), 1u);
+    EXPECT_EQ(form_errors({"sdf/a.cpp", "namespace HWY_NAMESPACE {\nint a;\n}\n"}).size(), 1u);
+    EXPECT_TRUE(form_errors({"sdf/a.cpp", "namespace HWY_NAMESPACE {\nnamespace {\nint a;\n}\n}\n"}).empty());
 }
 
 }  // namespace
