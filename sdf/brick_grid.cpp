@@ -45,6 +45,24 @@ LeafMask occupied_cells(const LeafMap& map, const FieldLeaf& leaf, float zero_be
     return occupied;
 }
 
+/// Counts cells as occupied over which the sign changes between samples that the band does not all hold: the
+/// lids of holes reach farther than it.
+void occupy_lids(Brick& brick) {
+    constexpr int kCorners[] = {0, 1, 8, 9, 64, 65, 72, 73};
+    for (int x = 0; x < kBrickCells; ++x) {
+        for (int y = 0; y < kBrickCells; ++y) {
+            for (int z = 0; z < kBrickCells; ++z) {
+                int negative = 0;
+                for (const int corner : kCorners) {
+                    negative += brick.sample[static_cast<std::size_t>(Brick::index(x, y, z) + corner)] < 0;
+                }
+                if (negative == 0 || negative == 8) continue;
+                brick.occupied[static_cast<std::size_t>(x)] |= std::uint64_t{1} << (kBrickCells * y + z);
+            }
+        }
+    }
+}
+
 /// Gives samples that the band does not hold the sign of their neighbours, in waves from those it holds.
 /// @param farthest sample that there is
 void fill_unknown(std::array<std::int16_t, kBrickSize>& sample, std::bitset<kBrickSize> is_known,
@@ -192,6 +210,7 @@ void BrickGrid::fill_brick(const LeafMap& map, const glm::ivec3& first_sample, B
             triangles[i] == kUnknown ? kNoPaletteEntry : static_cast<std::uint16_t>(entry - palette.begin());
     }
     fill_unknown(brick.sample, is_known, stored_sample(kBandVoxels, bits_));
+    occupy_lids(brick);
 }
 
 void BrickGrid::fill_empty_distances() {
