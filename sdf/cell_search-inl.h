@@ -7,7 +7,11 @@
 #define SDF_CELL_SEARCH_INL_H
 #endif
 
+#include <cstdint>
+#include <vector>
+
 #include "sdf/field_kernel-inl.h"
+#include "sdf/field_kernel.h"
 #include "sdf/field_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();

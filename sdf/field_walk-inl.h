@@ -8,6 +8,7 @@
 #endif
 
 #include "sdf/field_kernel-inl.h"
+#include "sdf/field_kernel.h"
 #include "sdf/skip_boxes.h"
 
 HWY_BEFORE_NAMESPACE();
