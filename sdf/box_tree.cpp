@@ -90,7 +90,8 @@ private:
 
     /// Leaves of so many boxes, the last perhaps unfilled.
     double leaves(std::size_t count) const {
-        return static_cast<double>((count + leaf_size_ - 1) / leaf_size_);
+        const std::size_t full = (count + leaf_size_ - 1) / leaf_size_;
+        return static_cast<double>(full);
     }
 
     Split partition(std::size_t begin, std::size_t end, const core::DoubleBounds& centers) {
@@ -224,7 +225,7 @@ private:
 
 }  // namespace
 
-BoxTree::BoxTree(std::span<const core::DoubleBounds> boxes, std::vector<std::uint32_t> selection,
+BoxTree::BoxTree(std::span<const core::DoubleBounds> boxes, const std::vector<std::uint32_t>& selection,
                  std::uint32_t leaf_size) {
     if (selection.empty()) return;
     for (const bool balanced : {false, true}) {

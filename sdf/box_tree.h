@@ -31,7 +31,7 @@ public:
     BoxTree() = default;
     /// @param selection the boxes that the tree holds, as indices; none of them empty
     /// @param leaf_size boxes a leaf; every leaf but one is full
-    BoxTree(std::span<const core::DoubleBounds> boxes, std::vector<std::uint32_t> selection,
+    BoxTree(std::span<const core::DoubleBounds> boxes, const std::vector<std::uint32_t>& selection,
             std::uint32_t leaf_size);
 
     /// Root first; empty if nothing was selected.

@@ -111,7 +111,8 @@ CellBox occupied_box(const Brick& brick) {
 
 std::int16_t stored_sample(float voxels, SampleBits bits) {
     const int unit = bits == SampleBits::k8 ? kCoarseSteps : 1;
-    const auto most = static_cast<float>(32767 / unit);
+    const int farthest = 32767 / unit;
+    const auto most = static_cast<float>(farthest);
     const float steps =
         std::clamp(std::round(voxels / (kSampleStepVoxels * static_cast<float>(unit))), -most, most);
     const auto stored = static_cast<int>(steps);

@@ -10,7 +10,7 @@ InstanceTree::InstanceTree(std::span<const core::DoubleBounds> boxes) {
         if (!boxes[i].empty()) order.push_back(i);
     }
     if (order.size() == 1) only_instance_ = order[0];
-    BoxTree tree(boxes, std::move(order), 1);
+    BoxTree tree(boxes, order, 1);
     nodes_ = std::move(tree.nodes);
     for (Node& node : nodes_) {
         for (std::int32_t& child : node.child) {
