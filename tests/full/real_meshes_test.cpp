@@ -98,8 +98,8 @@ TEST_P(RealScene, NoRayPassesThroughASheet) {
         count_passages(aimed, sdf::SdfTracer(scene, grids), core::TriangleTracer(scene));
     std::cout << "sheets " << GetParam() << ": " << passages << std::endl;
     EXPECT_EQ(passages.rays, kRays) << "none of the sheets is off its borders";
-    // None on 25 of 27 scenes. Rays of suzanne and toy_car that go in and out through lids far from all samples,
-    // both unseen, may pass what lies between: 21, and 17 and 12 without an occluder, of a million.
+    // None on 25 of 27 scenes. Rays of suzanne and toy_car that go in and out through lids far from all
+    // samples, both unseen, may pass what lies between: 21, and 17 and 12 without an occluder, of a million.
     EXPECT_LE(1e4 * static_cast<double>(passages.passed), static_cast<double>(passages.rays));
     EXPECT_LE(1e4 * static_cast<double>(passages.unoccluded), static_cast<double>(passages.rays));
     // At grazing angles the judge's floats may pass where double precision does not.
