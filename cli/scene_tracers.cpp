@@ -40,15 +40,14 @@ void add_hit_mode_option(CLI::App& verb, sdf::HitMode& mode) {
 }
 
 void add_sample_bits_option(CLI::App& verb, sdf::SampleBits& bits) {
-    const std::map<std::string, sdf::SampleBits> values = {{"8", sdf::SampleBits::k8},
-                                                           {"16", sdf::SampleBits::k16}};
-    verb.add_option("--sample-bits", bits,
-                    "Bits a sample of the fields: 16 (default), or 8, of which one read fetches four. 8 puts "
-                    "the surface up to "
-                    "0.016 voxel off and normals up to 1 degree, at the same speed and in the same memory: "
-                    "it is there to "
-                    "show that price")
-        ->transform(CLI::CheckedTransformer(values).description(""))
+    verb.add_option_function<int>(
+            "--sample-bits", [&bits](int value) { bits = static_cast<sdf::SampleBits>(value); },
+            "Bits a sample of the fields: 16 (default), or 8, of which one read fetches four. 8 puts "
+            "the surface up to "
+            "0.016 voxel off and normals up to 1 degree, at the same speed and in the same memory: "
+            "it is there to "
+            "show that price")
+        ->check(CLI::IsMember({8, 16}).description(""))
         ->type_name("8|16");
 }
 
