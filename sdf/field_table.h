@@ -44,10 +44,6 @@ public:
         return {top_.data(), boxes_.data(), bricks_.data(), cells_.data(), samples_.data(), bits_};
     }
     SurfaceTable surface_table() const { return {cells_.data(), triangles_.data()}; }
-    /// By its number over all fields.
-    const VoxelTriangle& triangle(std::int32_t number) const {
-        return triangles_[static_cast<std::size_t>(number)];
-    }
     std::size_t bytes() const;
 
     /// Kernels address samples by 32 bits: 2 GiB of them.

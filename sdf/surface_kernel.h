@@ -17,10 +17,6 @@ namespace sdf {
 struct VoxelTriangle {
     float a[3];          ///< First corner.
     float ab[3], ac[3];  ///< To the second and the third.
-
-    glm::vec3 scaled_normal() const {
-        return glm::cross(glm::vec3(ab[0], ab[1], ab[2]), glm::vec3(ac[0], ac[1], ac[2]));
-    }
 };
 
 /// A gradient of the field in one word: three components of 10 bits, in steps of kGradientStep.
