@@ -52,15 +52,7 @@ void SdfTracer::finish_crossing(std::size_t at, bool any, Work& work) const {
     const Crossing crossing = crossing_of(march_hit, passage.t_min, passage);
     if (placed.is_opaque && here.triangle != kNoTriangle && here.distance <= kFarthestTriangleVoxels) {
         // What accept() would say, without a ray in double.
-        NearestHit found;
-        found.t = crossing.t;
-        found.instance = passage.instance;
-        found.triangle = here.triangle;
-        found.barycentrics = here.barycentrics;
-        found.is_front = here.is_front;
-        found.gradient = here.gradient;
-        found.enters_negative = crossing.enters_negative;
-        keep_nearer(found, traced);
+        keep_nearer(here.hit(crossing.t, passage.instance, crossing.enters_negative), traced);
     } else {
         LocalRay local = local_ray(work.ray(slot), slot, traced, any);
         const bool starts_in_box = passage.t_min <= local.world.t_min;

@@ -167,15 +167,7 @@ void SdfTracer::settle(LocalRay& ray, const Surface& here, IfUnmet if_unmet, Wor
     if (if_unmet == IfUnmet::kTakeSurface &&
         (!has_alpha_ ||
          core::is_visible(scene_, ray.instance, here.triangle, here.barycentrics, ray.world.seed))) {
-        NearestHit found;
-        found.t = ray.come_to;
-        found.instance = ray.instance;
-        found.triangle = here.triangle;
-        found.barycentrics = here.barycentrics;
-        found.is_front = here.is_front;
-        found.gradient = here.gradient;
-        found.enters_negative = ray.is_inside;
-        keep_nearer(found, traced);
+        keep_nearer(here.hit(ray.come_to, ray.instance, ray.is_inside), traced);
         return;
     }
     // Up to `unmet_since` the triangles themselves have answered.

@@ -75,6 +75,18 @@ struct SdfTracer::Surface {
     glm::vec2 barycentrics{0.0f};
     bool is_front = true;      ///< Whether the ray comes from its front.
     glm::vec3 gradient{0.0f};  ///< Of the field.
+
+    NearestHit hit(double t, std::uint32_t instance, bool enters_negative) const {
+        NearestHit found;
+        found.t = t;
+        found.instance = instance;
+        found.triangle = triangle;
+        found.barycentrics = barycentrics;
+        found.is_front = is_front;
+        found.gradient = gradient;
+        found.enters_negative = enters_negative;
+        return found;
+    }
 };
 
 /// What a crossing of the field stands for.
