@@ -22,11 +22,20 @@ struct LightReceiver {
     glm::vec3 normal{0.0f, 0.0f, 1.0f};
 };
 
+/// The part of a scene's light that a sampler knows, beside all of Scene::lights.
+struct LightSubset {
+    const Sky* sky = nullptr;            ///< Instead of the scene's; nullptr: none. Outlives the sampler.
+    std::vector<std::uint8_t> emitters;  ///< By instance: whether its emissive triangles belong.
+};
+
 /// Immutable once built; thread-safe. Cost of a choice is linear in the number of groups.
 class LightSampler {
 public:
     /// @pre `scene` outlives the sampler.
     explicit LightSampler(const Scene& scene);
+
+    /// A part of the scene's light. @pre subset.emitters.size() == scene.instances.size()
+    LightSampler(const Scene& scene, const LightSubset& subset);
 
     bool empty() const { return groups_.empty(); }
     std::size_t group_count() const { return groups_.size(); }
@@ -99,6 +108,7 @@ private:
     Sample sample_emitter(const Emitter& emitter, const LightReceiver& receiver, const glm::vec2& u) const;
 
     const Scene& scene_;
+    const Sky* sky_;
     std::vector<Group> groups_;
     std::vector<Emitter> emitters_;
     std::vector<std::uint32_t> group_of_instance_;  ///< kNoIndex where nothing emits.

@@ -136,6 +136,19 @@ BrdfSample sample(const Brdf& brdf, const glm::vec3& outgoing, float u_lobe, con
     return result;
 }
 
+BrdfSample sample_specular(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec2& u) {
+    BrdfSample result;
+    if (!(outgoing.z > 0.0f) || !has_specular(brdf)) return result;
+    const glm::vec3 half = sample_visible_normal(outgoing, brdf.alpha, u);
+    const glm::vec3 incoming = 2.0f * glm::dot(outgoing, half) * half - outgoing;
+    if (!(incoming.z > 0.0f)) return result;
+    result.incoming = glm::normalize(incoming);
+    const glm::vec3 between = glm::normalize(outgoing + result.incoming);
+    result.value.specular = evaluate_with_half(brdf, outgoing, result.incoming, between).specular;
+    result.pdf = specular_pdf(brdf, outgoing, between);
+    return result;
+}
+
 glm::vec3 approximate_albedo(const Brdf& brdf) {
     return brdf.diffuse + brdf.f0;
 }

@@ -52,6 +52,9 @@ struct BrdfSample {
 /// @param u_lobe chooses diffuse or specular; u the direction; all in [0, 1).
 BrdfSample sample(const Brdf& brdf, const glm::vec3& outgoing, float u_lobe, const glm::vec2& u);
 
+/// Of the specular lobe alone: `value.diffuse` is 0 and the pdf that of visible normals. @param u in [0, 1)^2
+BrdfSample sample_specular(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec2& u);
+
 /// Directional albedo used to describe a surface in the Albedo AOV: diffuse colour plus f0.
 glm::vec3 approximate_albedo(const Brdf& brdf);
 

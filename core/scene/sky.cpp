@@ -121,9 +121,14 @@ Sky Sky::latitude_longitude(const Image& image, float rotation, const std::strin
         }
     }
 
+    return from_map(std::move(map));
+}
+
+Sky Sky::from_map(std::shared_ptr<Map> map) {
     // Bilinear reading spreads a texel over its neighbours, so the weight of a texel is the tent-filtered
     // luminance around it: positive wherever the interpolated radiance is.
     std::vector<float> weights(map->texels.size());
+    map->row_cosine.clear();
     for (int y = 0; y <= map->height; ++y) {
         map->row_cosine.push_back(
             static_cast<float>(std::cos(static_cast<double>(kPi) * y / static_cast<double>(map->height))));
@@ -203,6 +208,30 @@ float Sky::pdf(const glm::vec3& direction) const {
     if (!map_) return kUniformSpherePdf;
     const glm::vec2 point = map_->point_from_direction(direction);
     return map_->distribution.pdf(point) / map_->scaled_solid_angle(map_->row_of(point));
+}
+
+SkySplit split_sky(const Sky& sky, float ratio) {
+    if (sky.black() || std::isinf(ratio)) return {sky, {}};
+    if (!(ratio > 0.0f)) return {{}, sky};
+    const float threshold = ratio * sky.mean_luminance();
+    const auto base_part = [&](const glm::vec3& radiance) {
+        const float bright = luminance(radiance);
+        return bright > threshold ? radiance * (threshold / bright) : radiance;
+    };
+    if (!sky.map_) {
+        const glm::vec3 base = base_part(sky.constant_);
+        return {Sky::constant(base), Sky::constant(glm::max(glm::vec3(0.0f), sky.constant_ - base))};
+    }
+    auto base = std::make_shared<Sky::Map>(*sky.map_);
+    auto peaks = std::make_shared<Sky::Map>(*sky.map_);
+    bool any = false;
+    for (std::size_t i = 0; i < base->texels.size(); ++i) {
+        base->texels[i] = base_part(sky.map_->texels[i]);
+        peaks->texels[i] = glm::max(glm::vec3(0.0f), sky.map_->texels[i] - base->texels[i]);
+        any = any || luminance(peaks->texels[i]) > 0.0f;
+    }
+    if (!any) return {sky, {}};
+    return {Sky::from_map(std::move(base)), Sky::from_map(std::move(peaks))};
 }
 
 }  // namespace core

@@ -53,11 +53,25 @@ public:
 
 private:
     struct Map;  // The texels and their distribution.
+    friend struct SkySplit split_sky(const Sky& sky, float ratio);
+
+    /// Weighs the texels for sampling. @param map whose texels and rotation are set
+    static Sky from_map(std::shared_ptr<Map> map);
 
     bool black_ = true;
     glm::vec3 constant_{0.0f};
     float mean_luminance_ = 0.0f;
     std::shared_ptr<const Map> map_;
 };
+
+/// A sky as the sum of two, in every direction up to rounding.
+struct SkySplit {
+    Sky base;   ///< Nowhere brighter than the threshold between texels' values.
+    Sky peaks;  ///< What lies above it; black where nothing does.
+};
+
+/// Splits at `ratio` times the mean luminance, texel by texel. Ratio 0 puts all into the peaks, infinity all
+/// into the base.
+SkySplit split_sky(const Sky& sky, float ratio);
 
 }  // namespace core

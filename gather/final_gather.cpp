@@ -1,0 +1,302 @@
+#include "gather/final_gather.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <limits>
+
+#include "core/support/error.h"
+#include "core/support/parallel.h"
+#include "core/trace/surface.h"
+#include "gather/integrate/bent_normal.h"
+#include "gather/integrate/integrate.h"
+#include "gather/lighting/scene_lighting.h"
+#include "gather/lighting/visible_surfaces.h"
+#include "gather/screen_probes/filtering.h"
+#include "gather/screen_probes/placement.h"
+#include "gather/screen_probes/tracing.h"
+#include "gather/temporal/accumulation.h"
+
+namespace gather {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// What each pass of a picture took, by name, in the order of their first call.
+class Ledger {
+public:
+    template <typename Work>
+    void time(const char* name, const Work& work) {
+        const auto start = Clock::now();
+        const PassRays rays = work();
+        const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+        exhausted_ += rays.exhausted;
+        for (core::PassCost& pass : passes_) {
+            if (pass.name != name) continue;
+            pass.seconds += seconds;
+            pass.rays += rays.rays;
+            return;
+        }
+        passes_.push_back({name, seconds, rays.rays});
+    }
+
+    const std::vector<core::PassCost>& passes() const { return passes_; }
+    std::uint64_t exhausted() const { return exhausted_; }
+
+private:
+    std::vector<core::PassCost> passes_;
+    std::uint64_t exhausted_ = 0;
+};
+
+/// Everything that lives as long as one picture.
+class Picture {
+public:
+    Picture(const core::RenderInputs& inputs, const Settings& settings, const Plan& plan)
+        : inputs_(inputs),
+          settings_(settings),
+          plan_(plan),
+          lighting_(inputs.scene, inputs.tracer, lighting_settings(settings, plan)),
+          hit_lighting_(inputs.scene, inputs.tracer, lighting_,
+                        settings.bounces > 0 && lighting_.samples_anything()),
+          table_(settings.screen_probes.resolution),
+          accumulation_(inputs.width, inputs.height, inputs.aovs) {}
+
+    /// The frame as an ordered list of passes.
+    void render_frame(std::uint32_t frame) {
+        if (!plan_.on(Effect::kTemporal)) accumulation_.clear();
+        const std::size_t pixels =
+            static_cast<std::size_t>(inputs_.width) * static_cast<std::size_t>(inputs_.height);
+        direct_.assign(pixels, glm::vec3(0.0f));
+        ledger_.time("primary", [&] { return find_visible_surfaces(inputs_, lighting_, frame, visible_); });
+        if (lighting_.samples_anything()) {
+            ledger_.time("direct", [&] {
+                return add_direct_light(inputs_, lighting_, visible_, settings_.lighting.direct_samples,
+                                        frame, direct_);
+            });
+        }
+        if (plan_.on(Effect::kScreenProbes)) gather_light(frame);
+        ledger_.time("accumulate", [&] {
+            accumulate();
+            return PassRays{};
+        });
+    }
+
+    core::Frame finish(int frame_count);
+
+private:
+    static LightingSettings lighting_settings(const Settings& settings, const Plan& plan) {
+        LightingSettings result = settings.lighting;
+        if (!plan.on(Effect::kEmissiveSampling) && result.sampled_emitters == SampledEmitters::kAuto) {
+            result.sampled_power_share = std::numeric_limits<float>::infinity();
+        }
+        return result;
+    }
+
+    void gather_light(std::uint32_t frame);
+    void accumulate();
+    void add_probe_layers(core::Image& image) const;
+
+    const core::RenderInputs& inputs_;
+    const Settings& settings_;
+    const Plan& plan_;
+    SceneLighting lighting_;
+    HitLighting hit_lighting_;
+    TexelTable table_;
+    Accumulation accumulation_;
+    Ledger ledger_;
+
+    VisibleSurfaces visible_;
+    std::vector<glm::vec3> direct_, diffuse_, specular_;
+    ProbeAtlas atlas_, last_atlas_;
+    bool has_last_ = false;
+    std::vector<ProbeWeights> weights_;
+    std::vector<BentNormal> bent_;
+};
+
+void Picture::gather_light(std::uint32_t frame) {
+    const ScreenProbeSettings& probes = settings_.screen_probes;
+    const bool guided = plan_.on(Effect::kLightingPdf);
+    const bool filtered = plan_.on(Effect::kSpatialFilter);
+    const bool directional = plan_.on(Effect::kRoughSpecular);
+    if (guided) {
+        std::swap(atlas_, last_atlas_);
+        has_last_ = frame > 0;
+    }
+    ledger_.time("place_probes", [&] {
+        place_probes(visible_, probes, plan_.on(Effect::kAdaptiveProbes), frame, inputs_.seed, atlas_);
+        return PassRays{};
+    });
+    ProbeTraceCost cost;
+    ledger_.time("trace_probes", [&] {
+        cost = trace_probes(
+            {.inputs = inputs_,
+             .visible = visible_,
+             .lighting = lighting_,
+             .hit_lighting = hit_lighting_,
+             .table = table_,
+             .settings = probes,
+             .last = has_last_ ? &last_atlas_ : nullptr,
+             .cull = probes.importance_sampling && filtered,
+             .specular_roughness_max = directional ? settings_.integrate.rough_specular_max : -1.0f,
+             .frame = frame},
+            atlas_);
+        return PassRays{cost.probe_rays, cost.exhausted};
+    });
+    ledger_.time("probe_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
+    if (filtered) {
+        ledger_.time("filter_probes", [&] {
+            filter_probes(probes, table_, atlas_);
+            return PassRays{};
+        });
+    }
+    const bool bent = plan_.on(Effect::kBentNormal);
+    if (bent) {
+        ledger_.time("bent_normal", [&] {
+            return trace_bent_normals(inputs_, visible_, settings_.integrate, frame, bent_);
+        });
+    }
+    ledger_.time("integrate", [&] {
+        if (bent || settings_.integrate.diffuse == DiffuseIntegral::kSh) project_to_sh(table_, atlas_);
+        const IntegrateInputs in{visible_, atlas_, table_, probes, settings_.integrate, inputs_.seed, frame};
+        diffuse_.assign(visible_.depth.size(), glm::vec3(0.0f));
+        specular_.assign(visible_.depth.size(), glm::vec3(0.0f));
+        interpolate_probes(in, weights_);
+        integrate_diffuse(in, weights_, bent_, diffuse_);
+        integrate_specular(in, weights_, directional, specular_);
+        return PassRays{};
+    });
+}
+
+void Picture::accumulate() {
+    const bool gathered = plan_.on(Effect::kScreenProbes);
+    core::parallel_for(visible_.depth.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t pixel = begin; pixel < end; ++pixel) {
+            FramePixel value;
+            value.direct = visible_.emitted[pixel] + direct_[pixel];
+            value.steps = static_cast<float>(visible_.steps[pixel]);
+            if (visible_.surface(pixel)) {
+                const core::SurfacePoint& point = visible_.points[pixel];
+                value.surface = true;
+                value.depth = visible_.depth[pixel];
+                value.distance = visible_.distance[pixel];
+                value.normal = point.frame.normal;
+                value.albedo = core::approximate_albedo(point.brdf);
+                value.bent_normal = bent_.empty() ? point.frame.normal : bent_[pixel].direction;
+                if (gathered) {
+                    value.indirect_diffuse = diffuse_[pixel];
+                    value.indirect_specular = specular_[pixel];
+                    value.probe_support = weights_[pixel].support;
+                }
+            }
+            accumulation_.add(pixel, value);
+        }
+    });
+}
+
+void Picture::add_probe_layers(core::Image& image) const {
+    // Of the last frame: probes move from one to the next.
+    if (inputs_.aovs.count("Probes")) {
+        static constexpr std::array<glm::vec3, 4> kLevelColors = {
+            glm::vec3(1.0f), glm::vec3(0.1f, 0.9f, 0.1f), glm::vec3(1.0f, 0.7f, 0.0f),
+            glm::vec3(1.0f, 0.1f, 0.1f)};
+        std::vector<glm::vec3> colors(visible_.depth.size(), glm::vec3(0.0f));
+        for (const Probe& probe : atlas_.probes) {
+            if (!probe.valid()) continue;
+            colors[visible_.index(probe.pixel.x, probe.pixel.y)] =
+                kLevelColors[static_cast<std::size_t>(probe.level)];
+        }
+        image.add_color("Probes", colors);
+    }
+    if (inputs_.aovs.count("RaysPerTexel")) {
+        // Each uniform probe's map, spread over its tile.
+        std::vector<float>& values = image.add_channel("RaysPerTexel.Y");
+        for (int y = 0; y < visible_.height && !atlas_.ray_count.empty(); ++y) {
+            for (int x = 0; x < visible_.width; ++x) {
+                const int tile = (y / atlas_.spacing) * atlas_.tiles_x + x / atlas_.spacing;
+                const int u = (x % atlas_.spacing) * atlas_.resolution / atlas_.spacing;
+                const int v = (y % atlas_.spacing) * atlas_.resolution / atlas_.spacing;
+                values[visible_.index(x, y)] =
+                    atlas_.ray_count[static_cast<std::size_t>(tile) * atlas_.texel_count() +
+                                     static_cast<std::size_t>(v * atlas_.resolution + u)];
+            }
+        }
+    }
+}
+
+core::Image crop_image(const core::Image& image, const core::Crop& crop) {
+    core::Image result(crop.width, crop.height);
+    for (const core::Channel& channel : image.channels()) {
+        std::vector<float>& values = result.add_channel(channel.name);
+        for (int y = 0; y < crop.height; ++y) {
+            const auto from =
+                channel.values.begin() + static_cast<std::ptrdiff_t>(y + crop.y) * image.width() + crop.x;
+            std::copy(from, from + crop.width, values.begin() + static_cast<std::ptrdiff_t>(y) * crop.width);
+        }
+    }
+    return result;
+}
+
+core::Frame Picture::finish(int frame_count) {
+    core::Frame frame;
+    frame.image = accumulation_.develop(plan_.on(Effect::kTemporal) ? frame_count : 1);
+    add_probe_layers(frame.image);
+    if (inputs_.crop.width > 0) frame.image = crop_image(frame.image, inputs_.crop);
+    frame.passes = ledger_.passes();
+    for (const core::PassCost& pass : frame.passes) frame.rays += pass.rays;
+    frame.exhausted_rays = ledger_.exhausted();
+    frame.samples_per_pixel = frame_count;
+    return frame;
+}
+
+void check_layers(const std::set<std::string>& layers) {
+    static const std::set<std::string> known = {
+        "Depth",       "Normal",     "Albedo", "Direct", "IndirectDiffuse", "IndirectSpecular",
+        "HitDistance", "BentNormal", "Steps",  "Probes", "RaysPerTexel",    "ProbeWeight"};
+    for (const std::string& layer : layers) {
+        if (known.count(layer)) continue;
+        std::string names;
+        for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+        throw core::InputError(core::ErrorKind::kUsage,
+                               fmt::format("--aov {}: the final gather writes {}", layer, names));
+    }
+}
+
+}  // namespace
+
+std::uint64_t FinalGather::cache_bytes(int width, int height, const Settings& settings) {
+    const glm::ivec2 tiles = tile_grid(width, height, settings.screen_probes.spacing);
+    const std::uint64_t probes = static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y) +
+                                 adaptive_limit(width, height, settings.screen_probes);
+    // This frame's atlas, the last one's, and the filter's copy of a radiance.
+    return probes * 2 * probe_bytes(settings.screen_probes.resolution) +
+           probes * static_cast<std::uint64_t>(settings.screen_probes.resolution) *
+               static_cast<std::uint64_t>(settings.screen_probes.resolution) * (sizeof(glm::vec3) + 2);
+}
+
+std::uint64_t FinalGather::picture_bytes(int width, int height, const Settings& settings,
+                                         const std::set<std::string>& aovs) {
+    const std::uint64_t pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+    return cache_bytes(width, height, settings) + Accumulation::bytes(width, height, aovs) +
+           pixels *
+               (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + sizeof(ProbeWeights) + sizeof(BentNormal));
+}
+
+core::Frame FinalGather::render(const core::RenderInputs& inputs) {
+    check_layers(inputs.aovs);
+    const auto start = Clock::now();
+    Picture picture(inputs, settings_, plan_);
+    int done = 0;
+    while (done < settings_.frames) {
+        if (inputs.stop_requested && inputs.stop_requested()) throw core::Interrupted();
+        const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
+        if (done > 0 && inputs.time_budget_seconds > 0.0 && elapsed >= inputs.time_budget_seconds) break;
+        picture.render_frame(static_cast<std::uint32_t>(done));
+        ++done;
+        if (inputs.progress) inputs.progress("render", static_cast<double>(done) / settings_.frames);
+    }
+    return picture.finish(done);
+}
+
+}  // namespace gather

@@ -1,0 +1,148 @@
+#include "gather/integrate/integrate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/image/image.h"
+#include "core/math/octahedral.h"
+#include "core/math/random.h"
+#include "core/math/sampling.h"
+#include "core/support/parallel.h"
+#include "gather/integrate/reflectance.h"
+
+namespace gather {
+
+namespace {
+
+constexpr std::size_t kPixelsAtOnce = 1024;
+
+/// A pixel that moved may read where its plane weight to itself is at least this.
+constexpr float kSamePlane = 0.5f;
+
+core::ShColor mix_sh(const ProbeAtlas& atlas, const ProbeWeights& weights) {
+    core::ShColor sum{};
+    for (std::size_t i = 0; i < weights.count; ++i) {
+        const core::ShColor& sh = atlas.sh[weights.probe[i]];
+        for (std::size_t k = 0; k < core::kShCount; ++k) sum[k] += weights.weight[i] * sh[k];
+    }
+    return sum;
+}
+
+/// Irradiance about a normal.
+glm::vec3 irradiance(const IntegrateInputs& in, const ProbeWeights& weights, const glm::vec3& normal,
+                     std::vector<float>& cosine_weights) {
+    if (in.settings.diffuse == DiffuseIntegral::kSh) {
+        return glm::max(glm::vec3(0.0f),
+                        core::sh_dot(mix_sh(in.atlas, weights), core::sh_clamped_cosine(normal)));
+    }
+    cosine_weights.resize(in.atlas.texel_count());
+    in.table.cosine_weights(normal, cosine_weights);
+    glm::vec3 sum(0.0f);
+    for (std::size_t i = 0; i < weights.count; ++i) {
+        const std::span<const glm::vec3> texels = in.atlas.radiance_of(weights.probe[i]);
+        glm::vec3 one(0.0f);
+        for (std::size_t t = 0; t < texels.size(); ++t) one += cosine_weights[t] * texels[t];
+        sum += weights.weight[i] * one;
+    }
+    return sum;
+}
+
+bool has_specular(const core::Brdf& brdf) {
+    return brdf.f0.x > 0.0f || brdf.f0.y > 0.0f || brdf.f0.z > 0.0f || brdf.f90.x > 0.0f;
+}
+
+}  // namespace
+
+void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights) {
+    const VisibleSurfaces& visible = in.visible;
+    weights.resize(visible.depth.size());
+    const auto width = static_cast<std::size_t>(visible.width);
+    core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t pixel = begin; pixel < end; ++pixel) {
+            if (!visible.surface(pixel)) continue;
+            const glm::ivec2 at(pixel % width, pixel / width);
+            const core::SurfacePoint& point = visible.points[pixel];
+            ProbeReader reader{glm::vec2(at), point.position, point.geometric_normal, visible.depth[pixel]};
+            if (in.probes.jitter_interpolation && in.atlas.spacing > 1) {
+                const core::SampleSequence sequence(pixel_key(in.seed, at.x, at.y, kInterpolationUse),
+                                                    in.frame);
+                const glm::vec2 offset = (sequence.point(0) - 0.5f) * static_cast<float>(in.atlas.spacing);
+                const glm::ivec2 moved = glm::clamp(at + glm::ivec2(glm::round(offset)), glm::ivec2(0),
+                                                    glm::ivec2(visible.width, visible.height) - 1);
+                const std::size_t there = visible.index(moved.x, moved.y);
+                if (visible.surface(there) &&
+                    plane_weight(point.position, point.geometric_normal, visible.depth[pixel],
+                                 visible.points[there].position, in.probes.plane_sharpness) > kSamePlane) {
+                    reader.pixel = glm::vec2(moved);
+                }
+            }
+            weights[pixel] = find_probes(in.atlas, reader, in.probes.plane_sharpness);
+        }
+    });
+}
+
+void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
+                       const std::vector<BentNormal>& bent, std::vector<glm::vec3>& diffuse) {
+    const VisibleSurfaces& visible = in.visible;
+    core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+        std::vector<float> cosine_weights;
+        for (std::size_t pixel = begin; pixel < end; ++pixel) {
+            if (!visible.surface(pixel)) continue;
+            const core::SurfacePoint& point = visible.points[pixel];
+            const glm::vec3& normal = point.frame.normal;
+            const glm::vec3 albedo = diffuse_albedo(point.brdf, glm::dot(normal, visible.outgoing[pixel]));
+            if (albedo == glm::vec3(0.0f)) continue;
+            glm::vec3 arriving = irradiance(in, weights[pixel], normal, cosine_weights);
+            if (!bent.empty() && bent[pixel].visibility < 1.0f) {
+                const float v = bent[pixel].visibility;
+                const float near = multi_bounce(
+                    v, std::min(in.settings.near_field_albedo_max, core::luminance(point.brdf.diffuse)));
+                // The open part's share of what the same harmonics give for the whole hemisphere.
+                const core::ShColor sh = mix_sh(in.atlas, weights[pixel]);
+                arriving = cone_irradiance(sh, bent[pixel]) + (near - v) * arriving;
+            }
+            diffuse[pixel] += albedo / core::kPi * arriving;
+        }
+    });
+}
+
+void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights, bool directional,
+                        std::vector<glm::vec3>& specular) {
+    const VisibleSurfaces& visible = in.visible;
+    const auto width = static_cast<std::size_t>(visible.width);
+    const auto samples = static_cast<std::uint32_t>(in.settings.specular_directions);
+    core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+        std::vector<float> cosine_weights;
+        for (std::size_t pixel = begin; pixel < end; ++pixel) {
+            if (!visible.surface(pixel)) continue;
+            const core::SurfacePoint& point = visible.points[pixel];
+            if (!has_specular(point.brdf)) continue;
+            const glm::vec3 outgoing = point.frame.to_local(visible.outgoing[pixel]);
+            if (!directional || point.roughness > in.settings.rough_specular_max) {
+                specular[pixel] += specular_albedo(point.brdf, outgoing.z) / core::kPi *
+                                   irradiance(in, weights[pixel], point.frame.normal, cosine_weights);
+                continue;
+            }
+            const std::uint32_t key = pixel_key(in.seed, static_cast<int>(pixel % width),
+                                                static_cast<int>(pixel / width), kSpecularUse);
+            glm::vec3 sum(0.0f);
+            for (std::uint32_t k = 0; k < samples; ++k) {
+                const core::SampleSequence sequence(key, in.frame * samples + k);
+                const core::BrdfSample chosen =
+                    core::sample_specular(point.brdf, outgoing, sequence.point(0));
+                if (!(chosen.pdf > 0.0f)) continue;
+                const glm::vec3 direction = glm::normalize(point.frame.to_world(chosen.incoming));
+                const glm::vec2 at = core::octahedral_from_direction(direction);
+                glm::vec3 light(0.0f);
+                for (std::size_t i = 0; i < weights[pixel].count; ++i) {
+                    light += weights[pixel].weight[i] * in.atlas.read(weights[pixel].probe[i], at);
+                }
+                sum += chosen.value.specular * (chosen.incoming.z / chosen.pdf) * light;
+            }
+            specular[pixel] += sum / static_cast<float>(samples);
+        }
+    });
+}
+
+}  // namespace gather

@@ -1,0 +1,38 @@
+// gather/integrate/integrate.h: from the probes' light to a pixel's, at full resolution.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "gather/integrate/bent_normal.h"
+#include "gather/lighting/visible_surfaces.h"
+#include "gather/screen_probes/interpolation.h"
+#include "gather/screen_probes/probe_atlas.h"
+#include "gather/settings.h"
+
+namespace gather {
+
+struct IntegrateInputs {
+    const VisibleSurfaces& visible;
+    const ProbeAtlas& atlas;
+    const TexelTable& table;
+    const ScreenProbeSettings& probes;
+    const IntegrateSettings& settings;
+    std::uint64_t seed = 0;
+    std::uint32_t frame = 0;
+};
+
+/// Which probes every pixel reads.
+void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights);
+
+/// Light that the diffuse lobe sends to the eye, added to `diffuse`. @param bent empty: everything is open
+void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
+                       const std::vector<BentNormal>& bent, std::vector<glm::vec3>& diffuse);
+
+/// Light of the specular lobe. Surfaces smoother than settings.rough_specular_max reflect the probes in
+/// visible-normal GGX directions where `directional`; all others E / pi times the lobe's albedo.
+void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights, bool directional,
+                        std::vector<glm::vec3>& specular);
+
+}  // namespace gather

@@ -1,0 +1,106 @@
+// gather/lighting/scene_lighting.h: what lights a scene, split into what is sampled and what is hit.
+//
+// Nothing is counted twice: S (lights without a surface, the sun, small bright emitters, peaks of the sky)
+// enters at any vertex only by shadow rays, U (all other emission) only by rays that meet it.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/math/random.h"
+#include "core/render/light_sampler.h"
+#include "core/scene/scene.h"
+#include "core/scene/sky.h"
+#include "core/trace/surface.h"
+#include "core/trace/tracer.h"
+#include "gather/settings.h"
+
+namespace gather {
+
+/// Which part of the light each way of finding it brings. Immutable once built; thread-safe.
+class SceneLighting {
+public:
+    /// @pre scene outlives it. @param tracer for the start offsets of shadow rays
+    SceneLighting(const core::Scene& scene, const core::Tracer& tracer, const LightingSettings& settings);
+    SceneLighting(const SceneLighting&) = delete;
+    SceneLighting& operator=(const SceneLighting&) = delete;
+
+    /// All that a camera ray sees where it leaves the scene.
+    glm::vec3 seen_sky(const glm::vec3& direction) const { return everything_.escaped_radiance(direction); }
+
+    /// What a gathering ray brings from there: the part of the sky that is not sampled.
+    glm::vec3 gathered_sky(const glm::vec3& direction) const { return sky_.base.radiance(direction); }
+
+    /// Whether a gathering ray that hits this instance brings its emission.
+    bool gathers_emission(std::uint32_t instance) const { return sampled_emitters_[instance] == 0; }
+
+    /// Whether shadow rays have anything to go to.
+    bool samples_anything() const { return !sampled_->empty(); }
+
+    /// Whether gathering rays can bring light without any bounce.
+    bool gathers_anything() const { return gathers_anything_; }
+
+    const core::LightSampler& sampled() const { return *sampled_; }
+
+    float start_offset(std::uint32_t instance) const { return start_offsets_[instance]; }
+
+    /// Longer than any way through the scene, and finite: the distance of a ray that hits nothing.
+    float trace_limit() const { return trace_limit_; }
+
+private:
+    const core::Scene& scene_;
+    core::LightSampler everything_;
+    core::SkySplit sky_;
+    std::vector<std::uint8_t> sampled_emitters_;
+    std::optional<core::LightSampler> sampled_;
+    std::vector<float> start_offsets_;
+    float trace_limit_ = 1.0f;
+    bool gathers_anything_ = false;
+};
+
+/// One sampled light on its way to a surface, before its shadow ray.
+struct LightArrival {
+    core::Ray shadow_ray;
+    glm::vec3 diffuse{0.0f};   ///< Radiance it adds towards `outgoing` by the diffuse lobe,
+    glm::vec3 specular{0.0f};  ///< and by the specular one.
+};
+
+/// Chooses one light of S for a surface. Nothing where no light arrives.
+/// @param origin where rays leave the surface; `outgoing` unit, away from it
+std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::SurfacePoint& surface,
+                                         const glm::vec3& origin, const glm::vec3& outgoing, float u_light,
+                                         const glm::vec2& u_point, std::uint32_t seed);
+
+/// Light that hits send back along their rays: emission of U, and direct light of S by a shadow ray each;
+/// misses bring the sky of U. Of the cached bounce nothing yet: `bounced`, where present, is called for
+/// each hit and its light added.
+struct HitLightingCounters {
+    std::uint64_t shadow_rays = 0;
+    std::uint64_t exhausted = 0;
+};
+class HitLighting {
+public:
+    using Bounced = glm::vec3 (*)(const core::SurfacePoint& surface, const glm::vec3& outgoing);
+
+    HitLighting(const core::Scene& scene, const core::Tracer& tracer, const SceneLighting& lighting,
+                bool direct_light, Bounced bounced = nullptr)
+        : scene_(scene), tracer_(tracer), lighting_(lighting), direct_(direct_light), bounced_(bounced) {}
+
+    /// @param keys of the random numbers, one a ray; `frame` their index
+    /// @param radiance as long as rays
+    HitLightingCounters shade(const core::RayStream& rays, const core::HitStream& hits,
+                              std::span<const std::uint32_t> keys, std::uint32_t frame,
+                              std::span<glm::vec3> radiance) const;
+
+private:
+    const core::Scene& scene_;
+    const core::Tracer& tracer_;
+    const SceneLighting& lighting_;
+    bool direct_;
+    Bounced bounced_;
+};
+
+}  // namespace gather

@@ -1,0 +1,55 @@
+// gather/lighting/visible_surfaces.h: what each pixel sees in one frame, and its direct light.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "core/render/renderer.h"
+#include "core/trace/surface.h"
+#include "gather/lighting/scene_lighting.h"
+
+namespace gather {
+
+/// One camera ray a pixel; row-major. Pixels without a surface have depth 0.
+struct VisibleSurfaces {
+    int width = 0;
+    int height = 0;
+    std::vector<core::SurfacePoint> points;
+    std::vector<glm::vec3> origins;   ///< Where rays leave the surface.
+    std::vector<glm::vec3> outgoing;  ///< Unit, towards the camera.
+    std::vector<float> depth;         ///< Planar; 0: no surface.
+    std::vector<float> distance;      ///< Along the ray; 0: no surface.
+    std::vector<glm::vec3> emitted;   ///< Seen directly: emission of the surface, or the sky.
+    std::vector<std::uint32_t> steps;
+
+    bool surface(std::size_t pixel) const { return depth[pixel] > 0.0f; }
+    std::size_t index(int x, int y) const {
+        return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    }
+    void resize(int new_width, int new_height);
+};
+
+/// Bytes of one pixel of VisibleSurfaces.
+inline constexpr std::uint64_t kVisibleSurfaceBytes =
+    sizeof(core::SurfacePoint) + 3 * sizeof(glm::vec3) + 2 * sizeof(float) + sizeof(std::uint32_t);
+
+struct PassRays {
+    std::uint64_t rays = 0;
+    std::uint64_t exhausted = 0;
+};
+
+/// The key of a pixel's random numbers; `use` names the pass, so that dropping a pass shifts nothing.
+std::uint32_t pixel_key(std::uint64_t seed, int x, int y, std::uint32_t use);
+enum PixelUse : std::uint32_t { kCameraUse, kDirectUse, kInterpolationUse, kSpecularUse, kBentNormalUse };
+
+/// Camera rays of `frame`, jittered within their pixels.
+PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                               std::uint32_t frame, VisibleSurfaces& result);
+
+/// Adds the light of S to each pixel, `samples` lights each by a shadow ray.
+PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                          const VisibleSurfaces& visible, int samples, std::uint32_t frame,
+                          std::vector<glm::vec3>& direct);
+
+}  // namespace gather

@@ -1,0 +1,223 @@
+#include "gather/settings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <functional>
+
+#include "core/support/error.h"
+
+namespace gather {
+
+namespace {
+
+[[noreturn]] void fail(const std::string& message) {
+    throw core::InputError(core::ErrorKind::kUsage, message);
+}
+
+/// One row of the table: how a knob is read and written.
+struct Knob {
+    std::string name;
+    std::string values;
+    std::string meaning;
+    std::function<std::string(const Settings&)> get;
+    std::function<bool(Settings&, std::string_view)> set;  ///< False: not one of `values`.
+};
+
+template <typename Number>
+bool parse(std::string_view text, Number& number) {
+    const char* end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, number);
+    return error == std::errc() && rest == end && !text.empty();
+}
+
+template <typename Section>
+Knob flag(std::string name, Section Settings::*section, bool Section::*member, std::string meaning) {
+    return {std::move(name), "on|off", std::move(meaning),
+            [=](const Settings& s) { return std::string(s.*section.*member ? "on" : "off"); },
+            [=](Settings& s, std::string_view text) {
+                if (text != "on" && text != "off") return false;
+                s.*section.*member = text == "on";
+                return true;
+            }};
+}
+
+template <typename Section, typename Number>
+Knob number(std::string name, Section Settings::*section, Number Section::*member, Number least, Number most,
+            std::string meaning) {
+    return {std::move(name), fmt::format("{} ... {}", least, most), std::move(meaning),
+            [=](const Settings& s) { return fmt::format("{}", s.*section.*member); },
+            [=](Settings& s, std::string_view text) {
+                Number value{};
+                // Written so that NaN is refused.
+                if (!parse(text, value) || !(value >= least && value <= most)) return false;
+                s.*section.*member = value;
+                return true;
+            }};
+}
+
+template <typename Section, typename Value>
+Knob choice(std::string name, Section Settings::*section, Value Section::*member,
+            std::vector<std::pair<std::string, Value>> values, std::string meaning) {
+    std::string names;
+    for (const auto& [value_name, value] : values) names += (names.empty() ? "" : "|") + value_name;
+    return {std::move(name), names, std::move(meaning),
+            [=](const Settings& s) {
+                for (const auto& [value_name, value] : values) {
+                    if (value == s.*section.*member) return value_name;
+                }
+                return std::string();
+            },
+            [=](Settings& s, std::string_view text) {
+                for (const auto& [value_name, value] : values) {
+                    if (value_name != text) continue;
+                    s.*section.*member = value;
+                    return true;
+                }
+                return false;
+            }};
+}
+
+const std::vector<Knob>& knobs() {
+    using L = LightingSettings;
+    using P = ScreenProbeSettings;
+    using I = IntegrateSettings;
+    constexpr auto kL = &Settings::lighting;
+    constexpr auto kP = &Settings::screen_probes;
+    constexpr auto kI = &Settings::integrate;
+    static const std::vector<Knob> table = {
+        choice("lighting.sampled_emitters", kL, &L::sampled_emitters,
+               {{"auto", SampledEmitters::kAuto},
+                {"none", SampledEmitters::kNone},
+                {"all", SampledEmitters::kAll}},
+               "emitters and sky that take shadow rays; the others are found by being hit"),
+        number("lighting.sampled_solid_angle", kL, &L::sampled_solid_angle, 0.0f, 13.0f,
+               "steradians; emitters that look larger from within the scene are not sampled"),
+        number("lighting.sampled_power_share", kL, &L::sampled_power_share, 0.0f, 1.0f,
+               "of the emitters' power; those with less are not sampled"),
+        number("lighting.sky_peak_ratio", kL, &L::sky_peak_ratio, 0.0f, 1e6f,
+               "sky beyond this multiple of its mean luminance is sampled"),
+        number("lighting.direct_samples", kL, &L::direct_samples, 1, 64,
+               "lights that a pixel samples a frame"),
+        choice<P, int>("screen_probes.spacing", kP, &P::spacing,
+                       {{"1", 1}, {"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}, {"32", 32}},
+                       "pixels between uniform probes"),
+        choice<P, int>("screen_probes.resolution", kP, &P::resolution,
+                       {{"4", 4}, {"8", 8}, {"16", 16}, {"32", 32}}, "texels along an edge of a probe's map"),
+        flag("screen_probes.jitter_placement", kP, &P::jitter_placement,
+             "moves the grid from frame to frame"),
+        flag("screen_probes.jitter_directions", kP, &P::jitter_directions,
+             "moves rays within their texels from frame to frame"),
+        flag("screen_probes.adaptive", kP, &P::adaptive, "further probes where interpolation fails"),
+        number("screen_probes.adaptive_budget", kP, &P::adaptive_budget, 0.0f, 4.0f,
+               "most adaptive probes, as a share of the uniform ones"),
+        number("screen_probes.adaptive_threshold", kP, &P::adaptive_threshold, 0.0f, 1.0f,
+               "interpolation fails where plane weights sum to less"),
+        number("screen_probes.plane_sharpness", kP, &P::plane_sharpness, 0.0f, 1e8f,
+               "k in exp2(-k (plane distance / depth)^2)"),
+        flag("screen_probes.jitter_interpolation", kP, &P::jitter_interpolation,
+             "moves a pixel within its plane before it reads its probes"),
+        flag("screen_probes.importance_sampling", kP, &P::importance_sampling,
+             "moves rays from where the BRDF is small; needs the filter"),
+        number("screen_probes.cull_threshold", kP, &P::cull_threshold, 0.0f, 1.0f,
+               "of the BRDF, whose peak is about 1"),
+        flag("screen_probes.lighting_pdf", kP, &P::lighting_pdf, "guides rays by the last frame's light"),
+        flag("screen_probes.spatial_filter", kP, &P::spatial_filter, "averages probes with their neighbours"),
+        number("screen_probes.filter_passes", kP, &P::filter_passes, 1, 8, "of the spatial filter"),
+        number("screen_probes.filter_angle", kP, &P::filter_angle, 0.1f, 90.0f,
+               "degrees; a neighbour's ray that deviates by more is left out"),
+        flag("screen_probes.clamp_hit_distance", kP, &P::clamp_hit_distance,
+             "a neighbour's hit is no farther than one's own: keeps contact shadows"),
+        number("screen_probes.culled_weight", kP, &P::culled_weight, 0.0f, 1.0f,
+               "own weight of texels without rays, in the filter"),
+        number("screen_probes.max_ray_intensity", kP, &P::max_ray_intensity, 0.0f, 1e12f,
+               "cd/m^2; clamps brighter rays, which darkens the picture; 0: off"),
+        choice("integrate.diffuse", kI, &I::diffuse,
+               {{"sh", DiffuseIntegral::kSh}, {"sum", DiffuseIntegral::kSum}},
+               "spherical harmonics, or the cosine summed over all texels"),
+        flag("integrate.rough_specular", kI, &I::rough_specular, "reflects the probes in GGX directions"),
+        number("integrate.specular_directions", kI, &I::specular_directions, 1, 64, "a pixel a frame"),
+        number("integrate.rough_specular_max", kI, &I::rough_specular_max, 0.0f, 1.0f,
+               "rougher surfaces reflect E / pi"),
+        flag("integrate.bent_normal", kI, &I::bent_normal, "short rays restore contact shadows"),
+        number("integrate.bent_normal_rays", kI, &I::bent_normal_rays, 1, 64, "a pixel a frame"),
+        number("integrate.bent_normal_pixels", kI, &I::bent_normal_pixels, 1.0f, 64.0f,
+               "length of those rays on the screen"),
+        number("integrate.near_field_albedo_max", kI, &I::near_field_albedo_max, 0.0f, 1.0f,
+               "caps the albedo in the multi-bounce approximation"),
+        flag("temporal.accumulate", &Settings::temporal, &TemporalSettings::accumulate,
+             "the picture is the mean of its frames; off: the last frame"),
+    };
+    return table;
+}
+
+/// Levenshtein's distance.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::size_t diagonal = row[0];
+        row[0] = i;
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+            diagonal = row[j];
+            row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+        }
+    }
+    return row[b.size()];
+}
+
+}  // namespace
+
+std::vector<SettingDescription> describe_settings(const Settings& settings) {
+    std::vector<SettingDescription> result;
+    for (const Knob& knob : knobs()) {
+        result.push_back({knob.name, knob.get(settings), knob.values, knob.meaning});
+    }
+    return result;
+}
+
+void set_setting(Settings& settings, std::string_view name, std::string_view value) {
+    const Knob* nearest = nullptr;
+    std::size_t least = 0;
+    for (const Knob& knob : knobs()) {
+        const std::size_t distance = edit_distance(name, knob.name);
+        if (!nearest || distance < least) {
+            nearest = &knob;
+            least = distance;
+        }
+    }
+    if (least > 0) {
+        fail(fmt::format("--set {}: no such setting; the nearest is {} (render --help-settings lists them)",
+                         name, nearest->name));
+    }
+    if (!nearest->set(settings, value)) {
+        fail(fmt::format("--set {}={}: takes {}", name, value, nearest->values));
+    }
+}
+
+Settings quality_settings(std::string_view quality) {
+    Settings settings;
+    if (quality == "medium") return settings;
+    if (quality == "draft") {
+        settings.frames = 4;
+        settings.screen_probes.adaptive_budget = 0.25f;
+        settings.integrate.specular_directions = 2;
+        settings.integrate.bent_normal_rays = 2;
+    } else if (quality == "high" || quality == "ultra") {
+        const bool ultra = quality == "ultra";
+        settings.frames = ultra ? 64 : 32;
+        settings.screen_probes.spacing = 8;
+        settings.screen_probes.resolution = ultra ? 16 : 8;
+        settings.screen_probes.adaptive_budget = 1.0f;
+        settings.integrate.specular_directions = 8;
+        settings.integrate.bent_normal_rays = ultra ? 8 : 4;
+    } else {
+        fail(fmt::format("--quality {}: is draft, medium, high or ultra", quality));
+    }
+    return settings;
+}
+
+}  // namespace gather

@@ -1,0 +1,102 @@
+#include "gather/temporal/accumulation.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace gather {
+
+namespace {
+
+bool needs_auxiliary(const std::set<std::string>& layers) {
+    return std::any_of(layers.begin(), layers.end(), [](const std::string& layer) {
+        return layer != "Direct" && layer != "IndirectDiffuse" && layer != "IndirectSpecular";
+    });
+}
+
+}  // namespace
+
+Accumulation::Accumulation(int width, int height, std::set<std::string> layers)
+    : width_(width), height_(height), layers_(std::move(layers)), auxiliary_(needs_auxiliary(layers_)) {
+    clear();
+}
+
+void Accumulation::clear() {
+    const std::size_t count = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+    sums_.assign(count, Sum{});
+    auxiliary_sums_.assign(auxiliary_ ? count : 0, AuxiliarySum{});
+}
+
+void Accumulation::add(std::size_t pixel, const FramePixel& value) {
+    Sum& sum = sums_[pixel];
+    sum.direct += value.direct;
+    sum.indirect_diffuse += value.indirect_diffuse;
+    sum.indirect_specular += value.indirect_specular;
+    if (value.surface) sum.surface_count += 1.0f;
+    if (!auxiliary_) return;
+    AuxiliarySum& more = auxiliary_sums_[pixel];
+    more.steps += value.steps;
+    if (!value.surface) return;
+    more.normal += value.normal;
+    more.albedo += value.albedo;
+    more.bent_normal += value.bent_normal;
+    more.depth += value.depth;
+    more.distance += value.distance;
+    more.probe_support += value.probe_support;
+}
+
+core::Image Accumulation::develop(int frame_count) const {
+    core::Image image(width_, height_);
+    const float scale = 1.0f / static_cast<float>(frame_count);
+    const std::size_t count = sums_.size();
+    std::vector<glm::vec3> colors(count);
+    const auto add_color = [&](const char* layer, const auto& color) {
+        for (std::size_t i = 0; i < count; ++i) colors[i] = color(sums_[i]) * scale;
+        image.add_color(layer, colors);
+    };
+    add_color("", [](const Sum& s) { return s.direct + s.indirect_diffuse + s.indirect_specular; });
+    std::vector<float>& alpha = image.add_channel("A");
+    for (std::size_t i = 0; i < count; ++i) alpha[i] = sums_[i].surface_count * scale;
+    if (layers_.count("Direct")) add_color("Direct", [](const Sum& s) { return s.direct; });
+    if (layers_.count("IndirectDiffuse"))
+        add_color("IndirectDiffuse", [](const Sum& s) { return s.indirect_diffuse; });
+    if (layers_.count("IndirectSpecular"))
+        add_color("IndirectSpecular", [](const Sum& s) { return s.indirect_specular; });
+    // Means over the frames in which the pixel saw a surface.
+    const auto share = [&](std::size_t i) {
+        return sums_[i].surface_count > 0.0f ? 1.0f / sums_[i].surface_count : 0.0f;
+    };
+    const auto add_vector = [&](const char* layer, glm::vec3 AuxiliarySum::*member, bool color) {
+        if (!layers_.count(layer)) return;
+        for (std::size_t i = 0; i < count; ++i) colors[i] = auxiliary_sums_[i].*member * share(i);
+        if (color) {
+            image.add_color(layer, colors);
+        } else {
+            image.add_vector(layer, colors);
+        }
+    };
+    const auto add_number = [&](const char* layer, const char* channel, float AuxiliarySum::*member) {
+        if (!layers_.count(layer)) return;
+        std::vector<float>& values = image.add_channel(channel);
+        for (std::size_t i = 0; i < count; ++i) values[i] = auxiliary_sums_[i].*member * share(i);
+    };
+    add_vector("Normal", &AuxiliarySum::normal, false);
+    add_vector("Albedo", &AuxiliarySum::albedo, true);
+    add_vector("BentNormal", &AuxiliarySum::bent_normal, false);
+    add_number("Depth", "Depth.Z", &AuxiliarySum::depth);
+    add_number("HitDistance", "HitDistance.Z", &AuxiliarySum::distance);
+    add_number("ProbeWeight", "ProbeWeight.Y", &AuxiliarySum::probe_support);
+    if (layers_.count("Steps")) {
+        std::vector<float>& values = image.add_channel("Steps.Y");
+        for (std::size_t i = 0; i < count; ++i) values[i] = auxiliary_sums_[i].steps * scale;
+    }
+    return image;
+}
+
+std::uint64_t Accumulation::bytes(int width, int height, const std::set<std::string>& layers) {
+    const std::uint64_t channels = 4 + 3 * layers.size();
+    return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
+           (sizeof(Sum) + (needs_auxiliary(layers) ? sizeof(AuxiliarySum) : 0) + channels * sizeof(float) +
+            sizeof(glm::vec3));
+}
+
+}  // namespace gather
