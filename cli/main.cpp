@@ -48,6 +48,7 @@ int main(int argc, char** argv) {
     cli::add_compare_command(app, program);
     cli::add_convert_command(app, program);
     cli::add_inspect_command(app, program);
+    cli::add_plan_command(app, program);
 
     try {
         app.parse(argc, argv);

@@ -71,5 +71,6 @@ void add_render_command(CLI::App& app, Program& program);
 void add_compare_command(CLI::App& app, Program& program);
 void add_convert_command(CLI::App& app, Program& program);
 void add_inspect_command(CLI::App& app, Program& program);
+void add_plan_command(CLI::App& app, Program& program);
 
 }  // namespace cli

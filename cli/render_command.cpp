@@ -21,11 +21,18 @@ struct RenderFlags {
     std::string exposure = "auto";
     std::string tone_map = "aces";
     std::vector<std::string> aovs;
+    std::vector<std::string> settings;
+    std::string quality = "medium";
+    std::string effects = "auto";
+    int frames = 0;
     int bounces = 0;
     double voxel = 0.0;
     CLI::Option* bounces_option = nullptr;
     CLI::Option* voxel_option = nullptr;
     CLI::Option* samples_option = nullptr;
+    CLI::Option* frames_option = nullptr;
+    CLI::Option* quality_option = nullptr;
+    CLI::Option* effects_option = nullptr;
 };
 
 [[noreturn]] void fail(const std::string& message) {
@@ -49,12 +56,49 @@ void parse_crop(const std::string& text, RenderOptions& options) {
     }
 }
 
+/// The flags that belong to one renderer alone; the others' are usage errors.
+void understand_renderer(const RenderFlags& flags, RenderOptions& options) {
+    if (flags.renderer == "path") {
+        const auto refuse = [&](const CLI::Option* option, const char* name) {
+            if (option->count() > 0) fail(fmt::format("{}: belongs to --renderer gather, not to path", name));
+        };
+        refuse(flags.frames_option, "--accumulate");
+        refuse(flags.quality_option, "--quality");
+        refuse(flags.effects_option, "--effects");
+        if (!flags.settings.empty()) fail("--set: belongs to --renderer gather, not to path");
+        return;
+    }
+    if (flags.renderer != "gather") {
+        fail(fmt::format("--renderer {}: is not built yet; only 'path' and 'gather' are", flags.renderer));
+    }
+    options.renderer = RendererKind::kGather;
+    if (flags.samples_option->count() > 0) {
+        fail("--spp: belongs to --renderer path; the gather takes --accumulate, frames that it averages");
+    }
+    options.gather = gather::quality_settings(flags.quality);
+    if (flags.frames_option->count() > 0) options.gather.frames = flags.frames;
+    if (flags.bounces_option->count() > 0) options.gather.bounces = flags.bounces;
+    if (options.gather.bounces > 1) {
+        fail(fmt::format(
+            "--bounces {}: the gather reaches 0 or 1 until surfaces are cached; --renderer path has "
+            "no limit",
+            options.gather.bounces));
+    }
+    for (const std::string& setting : flags.settings) {
+        const std::size_t equals = setting.find('=');
+        if (equals == std::string::npos) {
+            fail(
+                fmt::format("--set {}: takes NAME=VALUE, such as screen_probes.spatial_filter=off", setting));
+        }
+        gather::set_setting(options.gather, setting.substr(0, equals), setting.substr(equals + 1));
+    }
+    options.effects = gather::parse_effects(flags.effects);
+}
+
 RenderOptions understand(const RenderFlags& flags, const CommonOptions& common) {
     RenderOptions options = flags.options;
     options.seed = common.seed;
-    if (flags.renderer != "path") {
-        fail(fmt::format("--renderer {}: is not built yet; only 'path' is", flags.renderer));
-    }
+    understand_renderer(flags, options);
     const glm::ivec2 size = parse_size(flags.size);
     options.width = size.x;
     options.height = size.y;
@@ -112,7 +156,8 @@ void add_render_command(CLI::App& app, Program& program) {
         ->type_name("KIND");
     add_hit_mode_option(*verb, options.hit_mode);
     add_sample_bits_option(*verb, options.bake.sample_bits);
-    verb->add_option("--renderer", flags->renderer, "path: the path tracer")
+    verb->add_option("--renderer", flags->renderer,
+                     "path: the path tracer; gather: light cached in probes on the screen, one bounce")
         ->check(CLI::IsMember({"path", "gather", "irradiance-field", "screen-denoiser", "direct"})
                     .description(""))
         ->capture_default_str();
@@ -122,6 +167,29 @@ void add_render_command(CLI::App& app, Program& program) {
     flags->samples_option = verb->add_option("--spp", options.samples_per_pixel, "Samples a pixel")
                                 ->check(CLI::Range(1, 1 << 24))
                                 ->capture_default_str();
+    flags->frames_option = verb->add_option("--accumulate", flags->frames, "Frames that the gather averages")
+                               ->check(CLI::Range(1, 1 << 16));
+    flags->quality_option = verb->add_option("--quality", flags->quality, "Row of settings of the gather")
+                                ->check(CLI::IsMember({"draft", "medium", "high", "ultra"}).description(""))
+                                ->capture_default_str();
+    verb->add_option(
+            "--set", flags->settings,
+            "NAME=VALUE of one setting of the gather, as often as wanted; --help-settings lists them")
+        ->allow_extra_args(false);
+    flags->effects_option =
+        verb->add_option("--effects", flags->effects,
+                         "Passes of the gather: auto (what the scene calls for), all, or names with commas")
+            ->capture_default_str();
+    verb->add_flag_callback(
+        "--help-settings",
+        [] {
+            for (const auto& setting : gather::describe_settings(gather::Settings{})) {
+                std::cout << fmt::format("{} = {}  ({})\n    {}\n", setting.name, setting.value,
+                                         setting.values, setting.meaning);
+            }
+            throw CLI::Success();
+        },
+        "List the settings of the gather with their values at medium quality, and end");
     flags->bounces_option =
         verb->add_option("--bounces", flags->bounces,
                          "Indirect bounces; 0 is emission and direct light; no limit by default")
@@ -141,9 +209,11 @@ void add_render_command(CLI::App& app, Program& program) {
         ->capture_default_str();
     verb->add_option("--bake-dir", options.bake_folder,
                      "Where baked fields are kept; default SCENE.bake beside the output");
-    verb->add_option("--aov", flags->aovs,
-                     "Further layers: "
-                     "Depth,Normal,Albedo,Direct,IndirectDiffuse,IndirectSpecular,Variance,HitDistance,Steps")
+    verb->add_option(
+            "--aov", flags->aovs,
+            "Further layers: "
+            "Depth,Normal,Albedo,Direct,IndirectDiffuse,IndirectSpecular,HitDistance,Steps; of the path "
+            "tracer Variance; of the gather BentNormal,Probes,RaysPerTexel,ProbeWeight")
         ->delimiter(',');
     verb->add_flag("--half", options.half, "16-bit colour layers; saturates at 65,504");
     verb->add_flag("--png", options.png, "Write a tone-mapped preview beside the EXR");
@@ -159,7 +229,9 @@ void add_render_command(CLI::App& app, Program& program) {
         "  fieldlight render room.glb -o room.exr --tracer triangle --bounces 2 --sky 500,600,800 --sun "
         "30,40,60000\n"
         "  fieldlight render toy.gltf -o toy.exr --primary sdf --resolution 256 --eye 0,1,3 --look-at 0,0,0 "
-        "--aov Depth,Normal");
+        "--aov Depth,Normal\n"
+        "  fieldlight render room.glb -o room.exr --renderer gather --quality draft --set "
+        "integrate.bent_normal=off");
 
     verb->callback([flags, &program] {
         run_verb(program, [&] {

@@ -13,6 +13,7 @@
 #include "core/support/error.h"
 #include "core/support/memory.h"
 #include "core/support/parallel.h"
+#include "gather/final_gather.h"
 
 namespace cli {
 
@@ -24,7 +25,14 @@ std::filesystem::path bake_folder(const RenderOptions& options) {
 }
 
 nlohmann::json statistics_of(const Program& program, const RenderOptions& options, const core::Frame& frame,
-                             const SceneTracers& tracers) {
+                             const SceneTracers& tracers, const gather::Plan& plan) {
+    nlohmann::json effects = nlohmann::json::object();
+    const bool gathers = options.renderer == RendererKind::kGather;
+    for (std::size_t i = 0; i < (gathers ? gather::kEffectCount : 0); ++i) {
+        const auto effect = static_cast<gather::Effect>(i);
+        effects[std::string(gather::name_of(effect))] = {{"on", plan.on(effect)},
+                                                         {"reason", plan[effect].reason}};
+    }
     nlohmann::json passes = nlohmann::json::array();
     for (const core::PassCost& pass : frame.passes) {
         passes.push_back({{"name", pass.name}, {"seconds", pass.seconds}, {"rays", pass.rays}});
@@ -47,7 +55,7 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
          traces_fields(options) ? nlohmann::json(name_of(options.hit_mode)) : nlohmann::json(nullptr)},
         {"sample_bits", traces_fields(options) ? nlohmann::json(static_cast<int>(options.bake.sample_bits))
                                                : nlohmann::json(nullptr)},
-        {"renderer", "path"},
+        {"renderer", name_of(options.renderer)},
         {"threads", core::thread_limit()},
         {"isa", instruction_set()},
         {"samples_per_pixel", frame.samples_per_pixel},
@@ -59,27 +67,41 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
          {{"peak_bytes", peak_memory_bytes()},
           {"sdf_bytes", tracers.sdf ? tracers.sdf->bytes() : 0},
           {"triangle_bytes", tracers.triangle ? tracers.triangle->bytes() : 0},
-          {"probe_bytes", 0}}},
+          {"probe_bytes",
+           gathers && plan.on(gather::Effect::kScreenProbes)
+               ? gather::FinalGather::cache_bytes(options.width, options.height, options.gather)
+               : 0}}},
+        {"effects", effects},
         {"nonfinite_pixels", 0}};
 }
 
 }  // namespace
 
+const char* name_of(RendererKind kind) {
+    return kind == RendererKind::kGather ? "gather" : "path";
+}
+
 core::Frame render_frame(const Program& program, const RenderOptions& options, const core::Scene& scene,
-                         const core::Camera& camera, const SceneTracers& tracers) {
-    core::PathTracer renderer({options.samples_per_pixel, options.bounces});
-    core::Frame frame = renderer.render({.scene = scene,
-                                         .camera = camera,
-                                         .tracer = tracers.get(options.tracer),
-                                         .primary = tracers.get(options.primary),
-                                         .width = options.width,
-                                         .height = options.height,
-                                         .crop = options.crop,
-                                         .seed = options.seed,
-                                         .aovs = options.aovs,
-                                         .time_budget_seconds = options.time_budget_seconds,
-                                         .progress = make_progress(program),
-                                         .stop_requested = stop_flag()});
+                         const core::Camera& camera, const SceneTracers& tracers, const gather::Plan& plan) {
+    std::unique_ptr<core::Renderer> renderer;
+    if (options.renderer == RendererKind::kGather) {
+        renderer = std::make_unique<gather::FinalGather>(options.gather, plan);
+    } else {
+        renderer = std::make_unique<core::PathTracer>(
+            core::PathTracerSettings{options.samples_per_pixel, options.bounces});
+    }
+    core::Frame frame = renderer->render({.scene = scene,
+                                          .camera = camera,
+                                          .tracer = tracers.get(options.tracer),
+                                          .primary = tracers.get(options.primary),
+                                          .width = options.width,
+                                          .height = options.height,
+                                          .crop = options.crop,
+                                          .seed = options.seed,
+                                          .aovs = options.aovs,
+                                          .time_budget_seconds = options.time_budget_seconds,
+                                          .progress = make_progress(program),
+                                          .stop_requested = stop_flag()});
     const std::size_t bad = core::count_nonfinite(frame.image);
     if (bad > 0) {
         throw std::runtime_error(
@@ -89,7 +111,8 @@ core::Frame render_frame(const Program& program, const RenderOptions& options, c
 }
 
 core::ExrAttributes picture_attributes(const RenderOptions& options, const core::Scene& scene,
-                                       const core::Camera& camera, const core::Frame& frame) {
+                                       const core::Camera& camera, const core::Frame& frame,
+                                       const gather::Plan& plan) {
     const core::CameraRays rays(camera, options.width, options.height);
     core::ExrAttributes attributes;
     // OpenEXR's camera space is left-handed and looks along +Z; glTF's looks along -Z.
@@ -100,10 +123,25 @@ core::ExrAttributes picture_attributes(const RenderOptions& options, const core:
     attributes["samplesPerPixel"] = static_cast<int>(frame.samples_per_pixel);
     attributes["seed"] = std::to_string(options.seed);
     attributes["fieldlightVersion"] = std::string(FIELDLIGHT_VERSION);
-    attributes["renderer"] = std::string("path");
+    attributes["renderer"] = std::string(name_of(options.renderer));
     attributes["tracer"] = std::string(name_of(options.tracer));
     attributes["primary"] = std::string(name_of(options.primary));
-    attributes["bounces"] = options.bounces < 0 ? std::string("unlimited") : std::to_string(options.bounces);
+    if (options.renderer == RendererKind::kGather) {
+        attributes["bounces"] = std::to_string(options.gather.bounces);
+        for (const gather::SettingDescription& setting : gather::describe_settings(options.gather)) {
+            attributes[setting.name] = setting.value;
+        }
+        std::string running;
+        for (std::size_t i = 0; i < gather::kEffectCount; ++i) {
+            const auto effect = static_cast<gather::Effect>(i);
+            if (plan.on(effect))
+                running += (running.empty() ? "" : " ") + std::string(gather::name_of(effect));
+        }
+        attributes["plan"] = running;
+    } else {
+        attributes["bounces"] =
+            options.bounces < 0 ? std::string("unlimited") : std::to_string(options.bounces);
+    }
     attributes["sceneHash"] = core::scene_hash(scene);
     attributes["sky"] = scene.sky_description;
     attributes["sun"] = options.scene.sun.empty() ? std::string("none") : options.scene.sun;
@@ -126,9 +164,12 @@ namespace {
 void require_picture_memory(const RenderOptions& options) {
     const int width = options.crop.width > 0 ? options.crop.width : options.width;
     const int height = options.crop.width > 0 ? options.crop.height : options.height;
-    core::require_memory(core::PathTracer::picture_bytes(width, height, options.aovs),
-                         fmt::format("'{}': a picture of {} x {} pixels with {} layers",
-                                     options.output.string(), width, height, options.aovs.size()));
+    const std::uint64_t bytes =
+        options.renderer == RendererKind::kGather
+            ? gather::FinalGather::picture_bytes(options.width, options.height, options.gather, options.aovs)
+            : core::PathTracer::picture_bytes(width, height, options.aovs);
+    core::require_memory(bytes, fmt::format("'{}': a picture of {} x {} pixels with {} layers",
+                                            options.output.string(), width, height, options.aovs.size()));
 }
 
 std::filesystem::path preview_file(const RenderOptions& options) {
@@ -148,9 +189,15 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     StageClock clock;
     require_picture_memory(options);
     require_places_for_files(options);
-    const core::Scene scene = load_scene(program, options.scene);
+    core::Scene scene = load_scene(program, options.scene);
     const core::Camera camera =
         choose_camera(program, options.scene, scene, static_cast<double>(options.width) / options.height);
+    gather::Plan plan;
+    if (options.renderer == RendererKind::kGather) {
+        plan = gather::make_plan(scene, options.width, options.height, options.gather, options.effects);
+        // Only a list can leave out what the scene has.
+        if (options.effects.kind == gather::EffectRequest::Kind::kList) gather::apply_plan(plan, scene);
+    }
     const double load_seconds = clock.lap();
 
     const bool needs_triangles =
@@ -167,11 +214,11 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     }
     const double build_seconds = clock.lap();
 
-    const core::Frame frame = render_frame(program, options, scene, camera, tracers);
+    const core::Frame frame = render_frame(program, options, scene, camera, tracers, plan);
     const double render_seconds = clock.lap();
 
     const std::size_t saturated = core::write_exr(
-        options.output, frame.image, picture_attributes(options, scene, camera, frame), options.half);
+        options.output, frame.image, picture_attributes(options, scene, camera, frame, plan), options.half);
     if (saturated > 0) {
         warn(program, fmt::format("'{}': {} values beyond 65,504 were saturated by --half",
                                   options.output.string(), saturated));
@@ -183,7 +230,7 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     }
     const double write_seconds = clock.lap();
 
-    nlohmann::json statistics = statistics_of(program, options, frame, tracers);
+    nlohmann::json statistics = statistics_of(program, options, frame, tracers, plan);
     statistics["missing_meshes"] = nlohmann::json::array();
     if (baked) {
         for (const sdf::MeshBake& mesh : baked->meshes) {

@@ -13,9 +13,16 @@
 #include "core/image/exr.h"
 #include "core/image/tonemap.h"
 #include "core/render/renderer.h"
+#include "gather/plan.h"
+#include "gather/settings.h"
 #include "sdf/baker.h"
 
 namespace cli {
+
+enum class RendererKind { kPath, kGather };
+
+/// As the flags spell it: path, gather.
+const char* name_of(RendererKind kind);
 
 /// What `fieldlight render` was asked for.
 struct RenderOptions {
@@ -26,8 +33,11 @@ struct RenderOptions {
     int width = 1280;
     int height = 720;
     core::Crop crop;
-    int samples_per_pixel = 64;
-    int bounces = -1;  ///< -1: no limit.
+    RendererKind renderer = RendererKind::kPath;
+    gather::Settings gather;        ///< Of the final gather alone.
+    gather::EffectRequest effects;  ///< Likewise.
+    int samples_per_pixel = 64;     ///< Of the path tracer alone.
+    int bounces = -1;               ///< Of the path tracer; -1: no limit.
     std::uint64_t seed = 0;
     double time_budget_seconds = 0.0;
     std::set<std::string> aovs;
@@ -46,14 +56,16 @@ inline bool traces_fields(const RenderOptions& options) {
     return options.tracer == TracerKind::kSdf || options.primary == TracerKind::kSdf;
 }
 
-/// The picture alone, of a scene that is ready to be traced.
+/// The picture alone, of a scene that is ready to be traced. @param plan of the final gather
 /// @throws core::InputError, core::Interrupted; std::runtime_error if a value is not finite
 core::Frame render_frame(const Program& program, const RenderOptions& options, const core::Scene& scene,
-                         const core::Camera& camera, const SceneTracers& tracers);
+                         const core::Camera& camera, const SceneTracers& tracers,
+                         const gather::Plan& plan = {});
 
 /// Everything that decided the picture, as the EXR keeps it.
 core::ExrAttributes picture_attributes(const RenderOptions& options, const core::Scene& scene,
-                                       const core::Camera& camera, const core::Frame& frame);
+                                       const core::Camera& camera, const core::Frame& frame,
+                                       const gather::Plan& plan = {});
 
 /// Renders and writes everything that was promised. Returns the object of `--stats`.
 /// @throws core::InputError, core::Interrupted; std::runtime_error if a pixel is not finite (nothing is
