@@ -38,9 +38,14 @@ float inverse_square(const glm::vec3& offset, float radius) {
 }  // namespace
 
 LightSampler::LightSampler(const Scene& scene)
+    : LightSampler(scene, {&scene.sky, std::vector<std::uint8_t>(scene.instances.size(), 1)}) {}
+
+LightSampler::LightSampler(const Scene& scene, const LightSubset& subset)
     : scene_(scene),
+      sky_(subset.sky),
       group_of_instance_(scene.instances.size(), kNoIndex),
       may_emit_(scene.instances.size(), 0) {
+    assert(subset.emitters.size() == scene.instances.size());
     for (std::uint32_t i = 0; i < scene.lights.size(); ++i) {
         if (!(estimated_power(scene.lights[i], 1.0f) > 0.0f)) continue;
         const auto* sun = std::get_if<DirectionalLight>(&scene.lights[i]);
@@ -49,14 +54,14 @@ LightSampler::LightSampler(const Scene& scene)
         }
         groups_.push_back({Kind::kLight, i, glm::vec3(0.0f), 0.0f, 0.0f});
     }
-    if (!scene.sky.black()) {
+    if (sky_ && !sky_->black()) {
         escaped_groups_.push_back(static_cast<std::uint32_t>(groups_.size()));
-        groups_.push_back({Kind::kSky, 0, glm::vec3(0.0f), 0.0f, kPi * scene.sky.mean_luminance()});
+        groups_.push_back({Kind::kSky, 0, glm::vec3(0.0f), 0.0f, kPi * sky_->mean_luminance()});
     }
-    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) add_emitter(i);
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) add_emitter(i, subset.emitters[i] != 0);
 }
 
-void LightSampler::add_emitter(std::uint32_t instance_index) {
+void LightSampler::add_emitter(std::uint32_t instance_index, bool sampled) {
     const Instance& instance = scene_.instances[instance_index];
     const Mesh& mesh = scene_.meshes[instance.mesh];
     Emitter emitter;
@@ -69,6 +74,7 @@ void LightSampler::add_emitter(std::uint32_t instance_index) {
         const Material& material = scene_.materials[instance.materials[part_index]];
         if (!material.emissive()) continue;
         may_emit_[instance_index] = 1;
+        if (!sampled) continue;
         for (std::uint32_t t = part.first_triangle; t < part.first_triangle + part.triangle_count; ++t) {
             const glm::uvec3& corners = mesh.triangles[t];
             glm::dvec3 points[3];
@@ -166,7 +172,7 @@ LightSampler::Sample LightSampler::sample(const LightReceiver& receiver, const S
     Sample result;
     switch (chosen->kind) {
         case Kind::kSky: {
-            const Sky::Sample sky = scene_.sky.sample(u);
+            const Sky::Sample sky = sky_->sample(u);
             result.direction = sky.direction;
             result.distance = std::numeric_limits<float>::infinity();
             result.radiance = sky.radiance;
@@ -242,7 +248,7 @@ glm::vec3 LightSampler::escaped_radiance(const glm::vec3& direction) const {
     glm::vec3 result(0.0f);
     for (const std::uint32_t index : escaped_groups_) {
         const Group& group = groups_[index];
-        result += group.kind == Kind::kSky ? scene_.sky.radiance(direction)
+        result += group.kind == Kind::kSky ? sky_->radiance(direction)
                                            : emission_along(scene_.lights[group.index], direction).radiance;
     }
     return result;
@@ -253,10 +259,9 @@ glm::vec3 LightSampler::weighted_escaped_radiance(const LightReceiver& receiver,
     glm::vec3 result(0.0f);
     for (const std::uint32_t index : escaped_groups_) {
         const Group& group = groups_[index];
-        const LightEmission emission =
-            group.kind == Kind::kSky
-                ? LightEmission{scene_.sky.radiance(direction), scene_.sky.pdf(direction)}
-                : emission_along(scene_.lights[group.index], direction);
+        const LightEmission emission = group.kind == Kind::kSky
+                                           ? LightEmission{sky_->radiance(direction), sky_->pdf(direction)}
+                                           : emission_along(scene_.lights[group.index], direction);
         if (!(emission.pdf > 0.0f)) {
             result += emission.radiance;
             continue;

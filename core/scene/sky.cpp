@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "core/image/exr.h"
@@ -120,7 +121,10 @@ Sky Sky::latitude_longitude(const Image& image, float rotation, const std::strin
             }
         }
     }
+    return from_map(std::move(map));
+}
 
+Sky Sky::from_map(std::shared_ptr<Map> map) {
     // Bilinear reading spreads a texel over its neighbours, so the weight of a texel is the tent-filtered
     // luminance around it: positive wherever the interpolated radiance is.
     std::vector<float> weights(map->texels.size());
@@ -203,6 +207,38 @@ float Sky::pdf(const glm::vec3& direction) const {
     if (!map_) return kUniformSpherePdf;
     const glm::vec2 point = map_->point_from_direction(direction);
     return map_->distribution.pdf(point) / map_->scaled_solid_angle(map_->row_of(point));
+}
+
+SkySplit split_sky(const Sky& sky, float ratio) {
+    assert(ratio >= 0.0f);
+    if (sky.black()) return {sky, Sky()};
+    if (ratio == 0.0f) return {Sky(), sky};
+    if (!sky.map_) {
+        if (ratio >= 1.0f) return {sky, Sky()};
+        const glm::vec3 base = ratio * sky.constant_;
+        return {Sky::constant(base), Sky::constant(sky.constant_ - base)};
+    }
+    const float threshold = ratio * sky.mean_luminance();
+    const auto exceeds = [&](const glm::vec3& texel) { return luminance(texel) > threshold; };
+    if (std::ranges::none_of(sky.map_->texels, exceeds)) return {sky, Sky()};
+
+    const auto empty_map = [&] {
+        auto map = std::make_shared<Sky::Map>();
+        map->width = sky.map_->width;
+        map->height = sky.map_->height;
+        map->texels.reserve(sky.map_->texels.size());
+        map->cos_rotation = sky.map_->cos_rotation;
+        map->sin_rotation = sky.map_->sin_rotation;
+        return map;
+    };
+    auto base = empty_map();
+    auto peaks = empty_map();
+    for (const glm::vec3& texel : sky.map_->texels) {
+        const glm::vec3 kept = exceeds(texel) ? texel * (threshold / luminance(texel)) : texel;
+        base->texels.push_back(kept);
+        peaks->texels.push_back(texel - kept);
+    }
+    return {Sky::from_map(std::move(base)), Sky::from_map(std::move(peaks))};
 }
 
 }  // namespace core

@@ -52,12 +52,28 @@ public:
     float mean_luminance() const { return mean_luminance_; }
 
 private:
+    friend struct SkySplit split_sky(const Sky& sky, float ratio);
+
     struct Map;  // The texels and their distribution.
+
+    /// Takes size, texels and rotation, and derives the rest.
+    static Sky from_map(std::shared_ptr<Map> map);
 
     bool black_ = true;
     glm::vec3 constant_{0.0f};
     float mean_luminance_ = 0.0f;
     std::shared_ptr<const Map> map_;
 };
+
+/// A sky as a sum: base.radiance(d) + peaks.radiance(d) is the whole's in every direction, up to rounding.
+struct SkySplit {
+    Sky base;
+    Sky peaks;
+};
+
+/// Puts what is brighter than `ratio` times the mean luminance into `peaks`, texel by texel and keeping its
+/// colour. Where nothing is, `base` shares the texels of `sky` and `peaks` is black; at 0 it is the reverse.
+/// @param ratio >= 0
+SkySplit split_sky(const Sky& sky, float ratio);
 
 }  // namespace core
