@@ -45,6 +45,7 @@ LightSampler::LightSampler(const Scene& scene, const LightSubset& subset)
       sky_(subset.sky),
       group_of_instance_(scene.instances.size(), kNoIndex),
       may_emit_(scene.instances.size(), 0) {
+    assert(subset.emitters.size() == scene.instances.size());
     for (std::uint32_t i = 0; i < scene.lights.size(); ++i) {
         if (!(estimated_power(scene.lights[i], 1.0f) > 0.0f)) continue;
         const auto* sun = std::get_if<DirectionalLight>(&scene.lights[i]);
@@ -57,12 +58,10 @@ LightSampler::LightSampler(const Scene& scene, const LightSubset& subset)
         escaped_groups_.push_back(static_cast<std::uint32_t>(groups_.size()));
         groups_.push_back({Kind::kSky, 0, glm::vec3(0.0f), 0.0f, kPi * sky_->mean_luminance()});
     }
-    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
-        if (subset.emitters[i] != 0) add_emitter(i);
-    }
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) add_emitter(i, subset.emitters[i] != 0);
 }
 
-void LightSampler::add_emitter(std::uint32_t instance_index) {
+void LightSampler::add_emitter(std::uint32_t instance_index, bool sampled) {
     const Instance& instance = scene_.instances[instance_index];
     const Mesh& mesh = scene_.meshes[instance.mesh];
     Emitter emitter;
@@ -75,6 +74,7 @@ void LightSampler::add_emitter(std::uint32_t instance_index) {
         const Material& material = scene_.materials[instance.materials[part_index]];
         if (!material.emissive()) continue;
         may_emit_[instance_index] = 1;
+        if (!sampled) continue;
         for (std::uint32_t t = part.first_triangle; t < part.first_triangle + part.triangle_count; ++t) {
             const glm::uvec3& corners = mesh.triangles[t];
             glm::dvec3 points[3];

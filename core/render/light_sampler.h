@@ -22,10 +22,10 @@ struct LightReceiver {
     glm::vec3 normal{0.0f, 0.0f, 1.0f};
 };
 
-/// The part of a scene's light that a sampler knows, beside all of Scene::lights.
+/// The lights a sampler is to know, beside all of scene.lights, which always belong.
 struct LightSubset {
-    const Sky* sky = nullptr;            ///< Instead of the scene's; nullptr: none. Outlives the sampler.
-    std::vector<std::uint8_t> emitters;  ///< By instance: whether its emissive triangles belong.
+    const Sky* sky = nullptr;            ///< In place of the scene's; null: no sky.
+    std::vector<std::uint8_t> emitters;  ///< By instance: whether its emissive triangles are sampled.
 };
 
 /// Immutable once built; thread-safe. Cost of a choice is linear in the number of groups.
@@ -34,7 +34,7 @@ public:
     /// @pre `scene` outlives the sampler.
     explicit LightSampler(const Scene& scene);
 
-    /// A part of the scene's light. @pre subset.emitters.size() == scene.instances.size()
+    /// @pre `scene` and `subset.sky` outlive the sampler; subset.emitters has one entry per instance.
     LightSampler(const Scene& scene, const LightSubset& subset);
 
     bool empty() const { return groups_.empty(); }
@@ -62,12 +62,16 @@ public:
     Sample sample(const LightReceiver& receiver, const Selection& selection, float u_group,
                   const glm::vec2& u) const;
 
-    /// Density with which sample() would have chosen the direction of a ray that hit an emissive triangle.
+    /// Density with which sample() would have chosen the direction of a ray that hit an emissive triangle; 0
+    /// for an instance that is not sampled.
     /// @param distance from the receiver to the hit; `direction` unit, from the receiver.
     float emitter_pdf(const LightReceiver& receiver, const Selection& selection, std::uint32_t instance,
                       std::uint32_t triangle, const glm::vec3& direction, float distance) const;
 
-    /// Whether any part of the triangle may emit.
+    /// Whether the instance's emissive triangles are among what sample() chooses from.
+    bool samples_emitter(std::uint32_t instance) const { return group_of_instance_[instance] != kNoIndex; }
+
+    /// Whether any part of the triangle may emit, be it sampled or not.
     bool emits(std::uint32_t instance, std::uint32_t triangle) const;
 
     /// Light that a ray which leaves the scene meets. With `receiver` and `selection` of where it started,
@@ -101,17 +105,17 @@ private:
         Distribution1D distribution;                   ///< Over `triangles`, by power.
     };
 
-    void add_emitter(std::uint32_t instance);
+    void add_emitter(std::uint32_t instance, bool sampled);
     float importance(const Group& group, const LightReceiver& receiver) const;
     float group_probability(const Group& group, const LightReceiver& receiver,
                             const Selection& selection) const;
     Sample sample_emitter(const Emitter& emitter, const LightReceiver& receiver, const glm::vec2& u) const;
 
     const Scene& scene_;
-    const Sky* sky_;
+    const Sky* sky_;  ///< Null: none.
     std::vector<Group> groups_;
     std::vector<Emitter> emitters_;
-    std::vector<std::uint32_t> group_of_instance_;  ///< kNoIndex where nothing emits.
+    std::vector<std::uint32_t> group_of_instance_;  ///< kNoIndex where nothing is sampled.
     std::vector<std::uint8_t> may_emit_;            ///< By instance: any part's material emits.
     std::vector<std::uint32_t> escaped_groups_;     ///< Groups that a ray can meet by missing everything.
 };

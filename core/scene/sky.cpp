@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "core/image/exr.h"
@@ -120,7 +121,6 @@ Sky Sky::latitude_longitude(const Image& image, float rotation, const std::strin
             }
         }
     }
-
     return from_map(std::move(map));
 }
 
@@ -211,26 +211,34 @@ float Sky::pdf(const glm::vec3& direction) const {
 }
 
 SkySplit split_sky(const Sky& sky, float ratio) {
-    if (sky.black() || std::isinf(ratio)) return {sky, {}};
-    if (!(ratio > 0.0f)) return {{}, sky};
-    const float threshold = ratio * sky.mean_luminance();
-    const auto base_part = [&](const glm::vec3& radiance) {
-        const float bright = luminance(radiance);
-        return bright > threshold ? radiance * (threshold / bright) : radiance;
-    };
+    assert(ratio >= 0.0f);
+    if (sky.black()) return {sky, Sky()};
+    if (ratio == 0.0f) return {Sky(), sky};
     if (!sky.map_) {
-        const glm::vec3 base = base_part(sky.constant_);
-        return {Sky::constant(base), Sky::constant(glm::max(glm::vec3(0.0f), sky.constant_ - base))};
+        if (ratio >= 1.0f) return {sky, Sky()};
+        const glm::vec3 base = ratio * sky.constant_;
+        return {Sky::constant(base), Sky::constant(sky.constant_ - base)};
     }
-    auto base = std::make_shared<Sky::Map>(*sky.map_);
-    auto peaks = std::make_shared<Sky::Map>(*sky.map_);
-    bool any = false;
-    for (std::size_t i = 0; i < base->texels.size(); ++i) {
-        base->texels[i] = base_part(sky.map_->texels[i]);
-        peaks->texels[i] = glm::max(glm::vec3(0.0f), sky.map_->texels[i] - base->texels[i]);
-        any = any || luminance(peaks->texels[i]) > 0.0f;
+    const float threshold = ratio * sky.mean_luminance();
+    const auto exceeds = [&](const glm::vec3& texel) { return luminance(texel) > threshold; };
+    if (std::ranges::none_of(sky.map_->texels, exceeds)) return {sky, Sky()};
+
+    const auto empty_map = [&] {
+        auto map = std::make_shared<Sky::Map>();
+        map->width = sky.map_->width;
+        map->height = sky.map_->height;
+        map->texels.reserve(sky.map_->texels.size());
+        map->cos_rotation = sky.map_->cos_rotation;
+        map->sin_rotation = sky.map_->sin_rotation;
+        return map;
+    };
+    auto base = empty_map();
+    auto peaks = empty_map();
+    for (const glm::vec3& texel : sky.map_->texels) {
+        const glm::vec3 kept = exceeds(texel) ? texel * (threshold / luminance(texel)) : texel;
+        base->texels.push_back(kept);
+        peaks->texels.push_back(texel - kept);
     }
-    if (!any) return {sky, {}};
     return {Sky::from_map(std::move(base)), Sky::from_map(std::move(peaks))};
 }
 

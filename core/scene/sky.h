@@ -52,10 +52,15 @@ public:
     float mean_luminance() const { return mean_luminance_; }
 
 private:
+    friend struct SkySplit split_sky(const Sky& sky, float ratio);
+
     struct Map;  // The texels and their distribution.
     friend struct SkySplit split_sky(const Sky& sky, float ratio);
 
     /// Weighs the texels for sampling. @param map whose texels and rotation are set
+    static Sky from_map(std::shared_ptr<Map> map);
+
+    /// Takes size, texels and rotation, and derives the rest.
     static Sky from_map(std::shared_ptr<Map> map);
 
     bool black_ = true;
@@ -64,14 +69,15 @@ private:
     std::shared_ptr<const Map> map_;
 };
 
-/// A sky as the sum of two, in every direction up to rounding.
+/// A sky as a sum: base.radiance(d) + peaks.radiance(d) is the whole's in every direction, up to rounding.
 struct SkySplit {
-    Sky base;   ///< Nowhere brighter than the threshold between texels' values.
-    Sky peaks;  ///< What lies above it; black where nothing does.
+    Sky base;
+    Sky peaks;
 };
 
-/// Splits at `ratio` times the mean luminance, texel by texel. Ratio 0 puts all into the peaks, infinity all
-/// into the base.
+/// Puts what is brighter than `ratio` times the mean luminance into `peaks`, texel by texel and keeping its
+/// colour. Where nothing is, `base` shares the texels of `sky` and `peaks` is black; at 0 it is the reverse.
+/// @param ratio >= 0
 SkySplit split_sky(const Sky& sky, float ratio);
 
 }  // namespace core

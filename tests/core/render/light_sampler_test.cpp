@@ -128,6 +128,59 @@ TEST(LightSampler, WeighsEscapedLightBetweenZeroAndAllOfIt) {
     }
 }
 
+TEST(LightSampler, SamplesASubsetOfEverythingLikeTheWhole) {
+    const core::Scene scene = many_lights();
+    const core::LightSampler whole(scene);
+    const core::LightSampler subset(
+        scene, {&scene.sky, std::vector<std::uint8_t>(scene.instances.size(), std::uint8_t{1})});
+    ASSERT_EQ(subset.group_count(), whole.group_count());
+    const core::LightReceiver receiver{glm::vec3(0.1f, -0.2f, 0.0f), {0, 0, 1}};
+    const auto selection = whole.selection(receiver);
+    EXPECT_EQ(subset.selection(receiver).scale, selection.scale);
+    EXPECT_EQ(subset.selection(receiver).floor, selection.floor);
+    tests::TestRandom random(9);
+    for (int i = 0; i < 10000; ++i) {
+        const auto u_group = static_cast<float>(random.uniform() * 0.9999999);
+        const glm::vec2 u(random.uniform() * 0.9999999, random.uniform() * 0.9999999);
+        const auto a = whole.sample(receiver, selection, u_group, u);
+        const auto b = subset.sample(receiver, selection, u_group, u);
+        EXPECT_EQ(a.direction, b.direction);
+        EXPECT_EQ(a.radiance, b.radiance);
+        EXPECT_EQ(a.pdf, b.pdf);
+        EXPECT_EQ(a.instance, b.instance);
+    }
+}
+
+TEST(LightSampler, NeverSamplesWhatASubsetLeavesOut) {
+    const core::Scene scene = many_lights();
+    const core::Sky sky = core::Sky::constant(glm::vec3(0.1f));
+    const core::LightSampler sampler(scene, {&sky, {0, 1}});
+    EXPECT_EQ(sampler.group_count(), 3u);
+    EXPECT_FALSE(sampler.samples_emitter(0));
+    EXPECT_TRUE(sampler.samples_emitter(1));
+    EXPECT_TRUE(sampler.emits(0, 0));
+    EXPECT_TRUE(sampler.emits(1, 0));
+    const core::LightReceiver receiver{glm::vec3(0.1f, -0.2f, 0.0f), {0, 0, 1}};
+    const auto selection = sampler.selection(receiver);
+    EXPECT_EQ(sampler.emitter_pdf(receiver, selection, 0, 0, {0, 0, 1}, 2.0f), 0.0f);
+    tests::TestRandom random(9);
+    bool met_the_other = false;
+    for (int i = 0; i < 10000; ++i) {
+        const auto sample =
+            sampler.sample(receiver, selection, static_cast<float>(random.uniform() * 0.9999999),
+                           glm::vec2(random.uniform() * 0.9999999, random.uniform() * 0.9999999));
+        EXPECT_NE(sample.instance, 0u);
+        met_the_other = met_the_other || sample.instance == 1u;
+    }
+    EXPECT_TRUE(met_the_other);
+
+    // The subset's sky takes the place of the scene's, or there is none. Straight down there is no sun.
+    EXPECT_EQ(sampler.escaped_radiance({0, -1, 0}), glm::vec3(0.1f));
+    const core::LightSampler skyless(scene, {nullptr, {0, 0}});
+    EXPECT_EQ(skyless.group_count(), 1u);
+    EXPECT_EQ(skyless.escaped_radiance({0, -1, 0}), glm::vec3(0.0f));
+}
+
 TEST(LightSampler, IsEmptyInADarkScene) {
     const core::Scene scene = tests::scene_of(tests::box());
     EXPECT_TRUE(core::LightSampler(scene).empty());

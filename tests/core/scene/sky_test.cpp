@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -127,6 +128,75 @@ TEST(Sky, RefusesTexelsThatSumsCannotHoldByName) {
             EXPECT_NE(std::string(error.what()).find("'blinding': pixel (2, 1)"), std::string::npos)
                 << error.what();
         }
+    }
+}
+
+TEST(SkySplit, AddsUpToTheSkyAndClampsTheBase) {
+    const core::Sky sky = core::Sky::latitude_longitude(picture(32, 16, 5), 0.6f, "test");
+    for (const float ratio : {0.0f, 0.5f, 2.0f, 10.0f}) {
+        const core::SkySplit split = core::split_sky(sky, ratio);
+        EXPECT_FALSE(split.peaks.black());
+        EXPECT_EQ(split.base.black(), ratio == 0.0f);
+        EXPECT_NEAR(split.base.mean_luminance() + split.peaks.mean_luminance(), sky.mean_luminance(),
+                    1e-5f * sky.mean_luminance());
+        tests::TestRandom random(8);
+        for (int i = 0; i < 20000; ++i) {
+            const glm::vec3 direction(random.direction());
+            const glm::vec3 whole = sky.radiance(direction);
+            const glm::vec3 base = split.base.radiance(direction);
+            const glm::vec3 peaks = split.peaks.radiance(direction);
+            for (int channel = 0; channel < 3; ++channel) {
+                // Rounding of texels up to 50.
+                EXPECT_NEAR(base[channel] + peaks[channel], whole[channel], 2e-5f);
+                EXPECT_GE(peaks[channel], 0.0f);
+            }
+            EXPECT_LE(core::luminance(base), ratio * sky.mean_luminance() * 1.00001f);
+            if (core::luminance(peaks) > 0.0f) {
+                EXPECT_GT(split.peaks.pdf(direction), 0.0f);
+            }
+        }
+    }
+}
+
+TEST(SkySplit, SamplesThePeaksAlone) {
+    core::Image image(64, 32);
+    std::vector<glm::vec3> colors(64 * 32, glm::vec3(0.1f));
+    colors[12 * 64 + 20] = glm::vec3(1e3f);
+    image.add_color("", colors);
+    const core::Sky sky = core::Sky::latitude_longitude(image, 0.0f, "test");
+    const core::SkySplit split = core::split_sky(sky, 4.0f);
+    tests::TestRandom random(2);
+    for (int i = 0; i < 1000; ++i) {
+        const core::Sky::Sample sample =
+            split.peaks.sample({static_cast<float>(random.uniform()), static_cast<float>(random.uniform())});
+        ASSERT_GT(sample.pdf, 0.0f);
+        // The tent's corner has 1 of 16 parts, on a texel of at most 2 pi^2 / (64 x 32) sr. Uniform: 0.08.
+        EXPECT_GT(sample.pdf, 0.9f / 16.0f * (64.0f * 32.0f) / (2.0f * core::kPi * core::kPi));
+    }
+}
+
+TEST(SkySplit, LeavesASkyWithoutPeaksAsItIs) {
+    const core::Sky sky = core::Sky::latitude_longitude(picture(8, 4, 3), 0.2f, "test");
+    const core::SkySplit split = core::split_sky(sky, 1e6f);
+    EXPECT_TRUE(split.peaks.black());
+    EXPECT_EQ(split.peaks.radiance({0, 1, 0}), glm::vec3(0.0f));
+    core::Hasher expected, actual;
+    sky.add_to(expected);
+    split.base.add_to(actual);
+    EXPECT_EQ(expected.hex(), actual.hex());
+    EXPECT_TRUE(core::split_sky(core::Sky(), 2.0f).base.black());
+    EXPECT_TRUE(core::split_sky(core::Sky(), 0.0f).peaks.black());
+}
+
+TEST(SkySplit, SharesAConstantByTheRatio) {
+    const glm::vec3 radiance(0.4f, 0.8f, 0.2f);
+    const core::Sky sky = core::Sky::constant(radiance);
+    for (const float ratio : {0.0f, 0.25f, 1.0f, 3.0f}) {
+        const core::SkySplit split = core::split_sky(sky, ratio);
+        EXPECT_EQ(split.base.black(), ratio == 0.0f);
+        EXPECT_EQ(split.peaks.black(), ratio >= 1.0f);
+        EXPECT_FLOAT_EQ(split.base.radiance({0, 1, 0}).y, std::min(ratio, 1.0f) * radiance.y);
+        EXPECT_FLOAT_EQ((split.base.radiance({0, 1, 0}) + split.peaks.radiance({0, 1, 0})).x, radiance.x);
     }
 }
 
