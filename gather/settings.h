@@ -33,7 +33,7 @@ struct ScreenProbeSettings {
     bool adaptive = true;              ///< Places further probes where interpolation fails.
     float adaptive_budget = 0.5f;      ///< Most adaptive probes, as a share of the uniform ones. 0 ... 4.
     float adaptive_threshold = 0.1f;   ///< Interpolation fails where the plane weights sum to less. 0 ... 1.
-    float plane_sharpness = 10000.0f;  ///< k in exp2(-k (plane distance / depth)^2). 0 ... 1e8.
+    float plane_sharpness = 1e5f;      ///< k in exp2(-k (plane distance / depth)^2). 0 ... 1e8.
     bool jitter_interpolation = true;  ///< Moves a pixel within its plane before it reads its probes.
     bool importance_sampling = true;   ///< Moves rays from where the BRDF is under `cull_threshold`.
     float cull_threshold = 0.1f;       ///< Of the BRDF, whose peak is about 1. 0 ... 1.

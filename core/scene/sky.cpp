@@ -128,7 +128,6 @@ Sky Sky::from_map(std::shared_ptr<Map> map) {
     // Bilinear reading spreads a texel over its neighbours, so the weight of a texel is the tent-filtered
     // luminance around it: positive wherever the interpolated radiance is.
     std::vector<float> weights(map->texels.size());
-    map->row_cosine.clear();
     for (int y = 0; y <= map->height; ++y) {
         map->row_cosine.push_back(
             static_cast<float>(std::cos(static_cast<double>(kPi) * y / static_cast<double>(map->height))));

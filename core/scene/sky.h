@@ -55,10 +55,6 @@ private:
     friend struct SkySplit split_sky(const Sky& sky, float ratio);
 
     struct Map;  // The texels and their distribution.
-    friend struct SkySplit split_sky(const Sky& sky, float ratio);
-
-    /// Weighs the texels for sampling. @param map whose texels and rotation are set
-    static Sky from_map(std::shared_ptr<Map> map);
 
     /// Takes size, texels and rotation, and derives the rest.
     static Sky from_map(std::shared_ptr<Map> map);

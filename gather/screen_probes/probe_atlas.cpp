@@ -1,6 +1,7 @@
 #include "gather/screen_probes/probe_atlas.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/math/octahedral.h"
@@ -13,7 +14,7 @@ namespace {
 
 /// Points along a texel's edge for averages that have no closed form.
 constexpr int kSub = 4;
-constexpr int kSubForSh = 16;
+constexpr int kEdgeForSh = 256;  ///< Of a whole map: midpoints' error falls with its square.
 
 }  // namespace
 
@@ -42,7 +43,8 @@ std::uint64_t probe_bytes(int resolution) {
            texels * (sizeof(glm::vec3) + sizeof(float) + sizeof(std::uint8_t));
 }
 
-TexelTable::TexelTable(int resolution) : resolution_(resolution) {
+TexelTable::TexelTable(int resolution) {
+    const int sub_for_sh = kEdgeForSh / resolution;
     const auto sub_direction = [&](int x, int y, int i, int j, int sub) {
         const glm::vec2 point(
             (static_cast<float>(x) + (static_cast<float>(i) + 0.5f) / static_cast<float>(sub)),
@@ -53,15 +55,15 @@ TexelTable::TexelTable(int resolution) : resolution_(resolution) {
         for (int x = 0; x < resolution; ++x) {
             centers_.push_back(sub_direction(x, y, 0, 0, 1));
             std::array<double, core::kShCount> sum{};
-            for (int j = 0; j < kSubForSh; ++j) {
-                for (int i = 0; i < kSubForSh; ++i) {
-                    const core::Sh basis = core::sh_basis(sub_direction(x, y, i, j, kSubForSh));
+            for (int j = 0; j < sub_for_sh; ++j) {
+                for (int i = 0; i < sub_for_sh; ++i) {
+                    const core::Sh basis = core::sh_basis(sub_direction(x, y, i, j, sub_for_sh));
                     for (std::size_t k = 0; k < core::kShCount; ++k) sum[k] += static_cast<double>(basis[k]);
                 }
             }
             core::Sh mean{};
             for (std::size_t k = 0; k < core::kShCount; ++k) {
-                mean[k] = static_cast<float>(sum[k] / (kSubForSh * kSubForSh));
+                mean[k] = static_cast<float>(sum[k] / (sub_for_sh * sub_for_sh));
             }
             mean_sh_.push_back(mean);
             for (int j = 0; j < kSub; ++j) {

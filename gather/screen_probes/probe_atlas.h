@@ -75,7 +75,6 @@ public:
     void cosine_weights(const glm::vec3& normal, std::span<float> weights) const;
 
 private:
-    int resolution_;
     std::vector<core::Sh> mean_sh_;
     std::vector<glm::vec3> centers_;
     std::vector<glm::vec3> sub_directions_;  ///< kSub x kSub a texel.

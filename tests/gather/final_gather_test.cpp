@@ -1,0 +1,143 @@
+// The whole frame against what is known: the furnace, other thread counts, `all` against `auto`.
+#include "gather/final_gather.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "core/scene/scene_loader.h"
+#include "core/support/error.h"
+#include "core/support/parallel.h"
+#include "core/trace/triangle_tracer.h"
+
+namespace {
+
+core::Scene asset(const std::string& name) {
+    return core::load_scene_file(std::string(FIELDLIGHT_SOURCE_DIR) + "/assets/" + name, {});
+}
+
+core::Frame render(const core::Scene& scene, const gather::Settings& settings, const char* effects,
+                   int width = 64, int height = 48) {
+    const core::TriangleTracer tracer(scene);
+    const core::Camera camera =
+        scene.cameras.empty() ? core::framing(core::world_bounds(scene), 4.0 / 3.0) : scene.cameras.front();
+    gather::FinalGather renderer(
+        settings, gather::make_plan(scene, width, height, settings, gather::parse_effects(effects)));
+    return renderer.render({.scene = scene,
+                            .camera = camera,
+                            .tracer = tracer,
+                            .primary = tracer,
+                            .width = width,
+                            .height = height,
+                            .crop = {},
+                            .seed = 3,
+                            .aovs = {"IndirectDiffuse", "Depth"},
+                            .progress = {},
+                            .stop_requested = {}});
+}
+
+void expect_same(const core::Image& a, const core::Image& b) {
+    ASSERT_EQ(a.channels().size(), b.channels().size());
+    for (std::size_t i = 0; i < a.channels().size(); ++i) {
+        EXPECT_EQ(a.channels()[i].name, b.channels()[i].name);
+        EXPECT_EQ(a.channels()[i].values, b.channels()[i].values) << a.channels()[i].name;
+    }
+}
+
+const char* const kAssets[] = {"cornell_box.glb", "two_rooms.glb", "thin_walls.glb", "glossy.glb",
+                               "instances.glb"};
+
+TEST(FinalGather, PixelsAreTheSameAtAnyThreadCount) {
+    const core::Scene scene = asset("glossy.glb");
+    gather::Settings settings;
+    settings.frames = 3;
+    std::optional<core::Frame> first;
+    for (const int threads : {1, 2, 3, 8}) {
+        core::with_thread_limit(threads, [&] {
+            const core::Frame frame = render(scene, settings, "auto");
+            if (first) expect_same(frame.image, first->image);
+            first = frame;
+        });
+    }
+}
+
+TEST(FinalGather, AutoEqualsAllAndNothingIsNotFinite) {
+    for (const char* name : kAssets) {
+        SCOPED_TRACE(name);
+        const core::Scene scene = asset(name);
+        for (const int frames : {1, 3}) {
+            gather::Settings settings;
+            settings.frames = frames;
+            const core::Frame automatic = render(scene, settings, "auto");
+            EXPECT_EQ(core::count_nonfinite(automatic.image), 0u);
+            expect_same(automatic.image, render(scene, settings, "all").image);
+        }
+    }
+}
+
+TEST(FinalGather, PassesThatAreOffTakeNoTimeAndNoRays) {
+    const core::Scene scene = asset("cornell_box.glb");
+    gather::Settings settings;
+    settings.frames = 1;
+    const core::Frame frame = render(scene, settings, "emissive_sampling");
+    for (const core::PassCost& pass : frame.passes) {
+        EXPECT_TRUE(pass.name == "primary" || pass.name == "direct" || pass.name == "accumulate")
+            << pass.name;
+    }
+}
+
+/// A constant sky about a convex Lambert body: every point sends back rho E / pi = rho, and no light comes
+/// from elsewhere.
+TEST(FinalGather, ConvexBodyInAConstantSkyIsAFurnace) {
+    core::Scene scene = asset("instances.glb");
+    scene.lights.clear();
+    scene.sky = core::Sky::constant(glm::vec3(1.0f));
+    // A single body: its own hits return nothing but what a convex body cannot meet.
+    scene.instances.resize(1);
+    for (core::Material& material : scene.materials) {
+        material = core::Material{};
+        material.base_color = glm::vec4(0.5f, 0.5f, 0.5f, 1.0f);
+        material.metallic = 0.0f;
+        material.specular = 0.0f;
+    }
+    scene.cameras.clear();
+    gather::Settings settings;
+    settings.frames = 8;
+    settings.bounces = 0;
+    settings.lighting.sampled_emitters = gather::SampledEmitters::kNone;
+    const core::Frame frame = render(scene, settings, "auto");
+    const std::vector<float>& light = *frame.image.find("IndirectDiffuse.R");
+    const std::vector<float>& alpha = *frame.image.find("A");
+    double sum = 0.0;
+    int count = 0;
+    for (std::size_t i = 0; i < light.size(); ++i) {
+        if (alpha[i] < 1.0f) continue;
+        sum += static_cast<double>(light[i]);
+        ++count;
+        EXPECT_LE(light[i], 0.5f * 1.05f);
+    }
+    ASSERT_GT(count, 50);
+    // The whole, converged, within 5 % and never above 1 % (reliability.md).
+    EXPECT_NEAR(sum / count / 0.5, 1.0, 0.05);
+    EXPECT_LE(sum / count / 0.5, 1.01);
+}
+
+TEST(FinalGather, RefusesLayersItDoesNotKnow) {
+    const core::Scene scene = asset("cornell_box.glb");
+    const core::TriangleTracer tracer(scene);
+    gather::FinalGather renderer({}, {});
+    EXPECT_THROW(renderer.render({.scene = scene,
+                                  .camera = scene.cameras.front(),
+                                  .tracer = tracer,
+                                  .primary = tracer,
+                                  .width = 8,
+                                  .height = 8,
+                                  .crop = {},
+                                  .seed = 0,
+                                  .aovs = {"Variance"},
+                                  .progress = {},
+                                  .stop_requested = {}}),
+                 core::InputError);
+}
+
+}  // namespace
