@@ -51,9 +51,9 @@ TEST(Program, TellsItsVerbsAndFlags) {
 }
 
 TEST(Program, SaysWhichRendererIsNotBuiltYet) {
-    const Outcome outcome = run("render " + cornell() + " -o x.exr --renderer gather");
+    const Outcome outcome = run("render " + cornell() + " -o x.exr --renderer screen-denoiser");
     EXPECT_EQ(outcome.exit_code, 64);
-    EXPECT_NE(outcome.text.find("gather"), std::string::npos);
+    EXPECT_NE(outcome.text.find("screen-denoiser"), std::string::npos);
     EXPECT_NE(outcome.text.find("not built yet"), std::string::npos);
 }
 
