@@ -41,7 +41,7 @@ struct SceneFacts {
 };
 
 bool has_specular(const core::Material& material) {
-    return material.metallic > 0.0f || (material.specular > 0.0f && material.ior != 1.0f);
+    return material.metallic > 0.0f || material.specular > 0.0f;
 }
 
 /// Textures and vertex colours only multiply, so a factor is an upper bound of roughness, and 0 a lower one.
