@@ -175,10 +175,10 @@ Plan Planner::make() {
                fmt::format("at most {:.0f} further probes",
                            static_cast<double>(probes.adaptive_budget) * static_cast<double>(tiles)));
     }
-    if (!depends(Effect::kSpatialFilter, probes.spatial_filter, "screen_probes.spatial_filter")) {
-        decide(Effect::kSpatialFilter, tiles > 1,
-               fmt::format("{} passes over 3 x 3 probes", probes.filter_passes),
-               "a single probe has no neighbour", "8 reads a texel and pass");
+    if (!depends(Effect::kSpatialFilter, probes.spatial_filter, "screen_probes.spatial_filter") &&
+        !forbid(Effect::kSpatialFilter, tiles == 1, "a single tile of probes has no neighbour")) {
+        decide(Effect::kSpatialFilter, true, fmt::format("{} passes over 3 x 3 probes", probes.filter_passes),
+               "", "8 reads a texel and pass");
     }
     if (!depends(Effect::kLightingPdf, probes.lighting_pdf && probes.importance_sampling,
                  "screen_probes.lighting_pdf or importance_sampling") &&
@@ -222,10 +222,11 @@ EffectRequest parse_effects(std::string_view text) {
         return request;
     }
     request.kind = EffectRequest::Kind::kList;
-    while (!text.empty()) {
+    for (bool more = true; more;) {
         const std::size_t comma = text.find(',');
         const std::string_view name = text.substr(0, comma);
-        text = comma == std::string_view::npos ? std::string_view() : text.substr(comma + 1);
+        more = comma != std::string_view::npos;
+        text = more ? text.substr(comma + 1) : std::string_view();
         const auto found = std::find(kNames.begin(), kNames.end(), name);
         if (found == kNames.end()) {
             std::string names;
