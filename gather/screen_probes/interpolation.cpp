@@ -13,15 +13,24 @@ constexpr float kLeastCorner = 1e-3f;
 /// Below this no probe lies in the point's plane.
 constexpr float kLeastSupport = 1e-6f;
 
-/// Normals across a convex edge whose cosine is less share nothing.
+/// Normals whose cosine is less share nothing.
 constexpr float kLeastConvexCosine = 0.5f;
+constexpr float kLeastConcaveCosine = 0.0f;
 
 /// @param offset from the point with the first normal to the one with the second
-float convexity_weight(const glm::vec3& offset, const glm::vec3& normal, const glm::vec3& other) {
-    // The sum of what each lies above the other's plane: below 0 the surface between them is convex.
-    if (!(glm::dot(offset, normal - other) < 0.0f)) return 1.0f;
-    return glm::clamp((glm::dot(normal, other) - kLeastConvexCosine) / (1.0f - kLeastConvexCosine), 0.0f,
-                      1.0f);
+float plane_distance(const glm::vec3& offset, const glm::vec3& normal, const glm::vec3& other) {
+    return std::max(std::abs(glm::dot(offset, normal)), std::abs(glm::dot(offset, other)));
+}
+
+float normal_weight(const glm::vec3& offset, const glm::vec3& normal, const glm::vec3& other) {
+    // The sum of what each point lies above the other's plane: below 0 the surface between them is convex.
+    const bool convex = glm::dot(offset, normal - other) < 0.0f;
+    const float least = convex ? kLeastConvexCosine : kLeastConcaveCosine;
+    return glm::clamp(2.0f * (glm::dot(normal, other) - least), 0.0f, 1.0f);
+}
+
+float weight_at(float relative_distance, float sharpness) {
+    return std::exp2(-sharpness * relative_distance * relative_distance);
 }
 
 float tent(const glm::vec2& offset, float radius) {
@@ -34,8 +43,8 @@ float tent(const glm::vec2& offset, float radius) {
 float surface_weight(const glm::vec3& position, const glm::vec3& normal, float depth, const glm::vec3& other,
                      const glm::vec3& other_normal, float sharpness) {
     const glm::vec3 offset = other - position;
-    const float distance = glm::dot(offset, normal) / depth;
-    return std::exp2(-sharpness * distance * distance) * convexity_weight(offset, normal, other_normal);
+    return weight_at(plane_distance(offset, normal, other_normal) / depth, sharpness) *
+           normal_weight(offset, normal, other_normal);
 }
 
 ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, float sharpness) {
@@ -49,18 +58,18 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
         const Probe& probe = atlas.probes[index];
         if (!probe.valid()) return;
         const glm::vec3 offset = probe.position - reader.position;
-        const float distance = std::abs(glm::dot(offset, reader.normal));
-        const float convexity = convexity_weight(offset, reader.normal, probe.normal);
-        // Round a convex edge only where there is no other.
-        const float badness = distance + (1.0f - convexity) * reader.depth;
+        const glm::vec3 offset = probe.position - reader.position;
+        const float distance = plane_distance(offset, reader.normal, probe.normal);
+        const float facing = normal_weight(offset, reader.normal, probe.normal);
+        // One that faces elsewhere stands in only where there is no other.
+        const float badness = distance + (1.0f - facing) * reader.depth;
         if (badness < least_badness) {
             least_badness = badness;
             nearest = index;
         }
         const float corner = std::max(least, tent(glm::vec2(probe.pixel) - reader.pixel, spacing));
         if (!(corner > 0.0f) || result.count == ProbeWeights::kMost) return;
-        const float relative = distance / reader.depth;
-        const float weight = corner * std::exp2(-sharpness * relative * relative) * convexity;
+        const float weight = corner * weight_at(distance / reader.depth, sharpness) * facing;
         if (!(weight > 0.0f)) return;
         result.probe[result.count] = index;
         result.weight[result.count++] = weight;

@@ -1,9 +1,10 @@
 // gather/screen_probes/interpolation.h: which probes a point of a surface reads, and with what weights.
 //
-// Bilinear on the screen times exp2(-k (|dot(x_probe - x, n)| / depth)^2): probes off the plane of the point
-// do not count, so that a foreground does not leak onto what is behind it. A probe holds the whole sphere, so
-// its normal does not matter, but for one case: round a convex edge. There the point sees directions that lie
-// under the probe's own surface, where the probe has found that surface and not what is beyond the edge.
+// Bilinear on the screen times exp2(-k (plane distance / depth)^2), the plane distance taken from either
+// surface: probes off the plane of the point do not count, so that a foreground does not leak onto what is
+// behind it. Directions under a probe's own surface bring back that surface, and not what a point beyond the
+// edge sees there. So probes count less as the normals part: not at all from 60 degrees round a convex edge,
+// from 90 in a concave one, where they would bring the light of a lit floor up a dark wall.
 #pragma once
 
 #include <array>
@@ -32,9 +33,8 @@ struct ProbeWeights {
     bool confident = true;  ///< False: no probe lies in the plane; the nearest to it stands in.
 };
 
-/// How well light at one point of a surface stands for light at another.
-/// @return exp2(-k (distance of `other` from the plane / depth)^2), times a weight that falls from 1 to 0 as
-/// the normals part by up to 60 degrees where the surface between them is convex
+/// How well the light at one point of a surface stands for the light at another, as said above.
+/// @param depth planar, of the first point. @return 0 ... 1
 float surface_weight(const glm::vec3& position, const glm::vec3& normal, float depth, const glm::vec3& other,
                      const glm::vec3& other_normal, float sharpness);
 

@@ -1,6 +1,7 @@
 #include "gather/screen_probes/tracing.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cassert>
 #include <cmath>
@@ -32,9 +33,35 @@ struct Batch {
     std::vector<float> brdf, light;
 };
 
-glm::vec2 frame_jitter(const ProbeTraceInputs& in) {
-    if (!in.settings.jitter_directions) return glm::vec2(0.5f);
-    return core::SampleSequence(pixel_key(in.inputs.seed, 0, 0, kJitterUse), in.frame).point(0);
+/// Places within a texel that a ray tries in turn until it leaves the surface. The same for all probes of a
+/// frame, so that the rays of neighbours match.
+using Jitters = std::array<glm::vec2, 8>;
+
+Jitters frame_jitters(const ProbeTraceInputs& in) {
+    Jitters jitters;
+    const auto count = static_cast<std::uint32_t>(jitters.size());
+    // Without jitter the centre comes first, and the others are the same in every frame.
+    const std::uint32_t frame = in.settings.jitter_directions ? in.frame : 0;
+    for (std::uint32_t k = 0; k < count; ++k) {
+        jitters[k] = core::SampleSequence(pixel_key(in.inputs.seed, 0, k, kJitterUse), frame).point(0);
+    }
+    if (!in.settings.jitter_directions) jitters[0] = glm::vec2(0.5f);
+    return jitters;
+}
+
+/// A direction within the texel of a ray, above the probe's surface if any tried is: what lies under it is
+/// the surface itself, whose own light would shine on it through the texels that straddle its horizon.
+glm::vec3 ray_direction(const ProbeRay& ray, int resolution, const Jitters& jitters,
+                        const glm::vec3& normal) {
+    const auto edge = static_cast<float>(resolution << ray.level);
+    glm::vec3 first(0.0f);
+    for (std::size_t k = 0; k < jitters.size(); ++k) {
+        const glm::vec3 direction =
+            glm::normalize(core::direction_from_octahedral((glm::vec2(ray.x, ray.y) + jitters[k]) / edge));
+        if (glm::dot(direction, normal) > 0.0f) return direction;
+        if (k == 0) first = direction;
+    }
+    return first;
 }
 
 void choose(const ProbeTraceInputs& in, const Probe& probe, std::span<ProbeRay> rays, Batch& batch) {
@@ -58,7 +85,7 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
     const std::size_t texels = atlas.texel_count();
     const std::size_t probes_at_once = std::max<std::size_t>(1, kRaysAtOnce / texels);
     const std::vector<ProbeRay> uniform = uniform_rays(atlas.resolution);
-    const glm::vec2 jitter = frame_jitter(in);
+    const Jitters jitters = frame_jitters(in);
     const std::size_t batches = (atlas.probes.size() + probes_at_once - 1) / probes_at_once;
     std::vector<double> brought(batches, 0.0);
     std::vector<double> removed(batches, 0.0);
@@ -94,10 +121,8 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
                 const ProbeRay& choice = batch.choice[batch.order[i]];
                 const std::uint32_t probe_index = probe_of[batch.order[i] / texels];
                 const Probe& probe = atlas.probes[probe_index];
-                const auto edge = static_cast<float>(atlas.resolution << choice.level);
                 core::Ray ray;
-                ray.direction = glm::normalize(
-                    core::direction_from_octahedral((glm::vec2(choice.x, choice.y) + jitter) / edge));
+                ray.direction = ray_direction(choice, atlas.resolution, jitters, probe.normal);
                 ray.origin = in.visible.origins[in.visible.index(probe.pixel.x, probe.pixel.y)];
                 batch.keys[i] = core::hash_words(
                     pixel_key(in.inputs.seed, probe.pixel.x, probe.pixel.y, kProbeUse), choice.x, choice.y,
