@@ -11,7 +11,6 @@
 #include <sstream>
 #include <string>
 
-#include "cli/flag_hints.h"
 #include "core/image/exr.h"
 #include "tests/support/shared_data.h"
 
@@ -131,14 +130,6 @@ TEST(Program, CropsWhatTheWholePictureShows) {
         }
     }
     EXPECT_LE(different, 2);
-}
-
-TEST(FlagHints, MeasuresEditsWithSwaps) {
-    EXPECT_EQ(cli::edit_distance("tracer", "tracer"), 0);
-    EXPECT_EQ(cli::edit_distance("tracer", "trcaer"), 1);
-    EXPECT_EQ(cli::edit_distance("", "abc"), 3);
-    EXPECT_EQ(cli::nearest("--zzzzzzzz", {"--tracer", "--size"}), "");
-    EXPECT_EQ(cli::nearest("--sise", {"--tracer", "--size"}), "--size");
 }
 
 }  // namespace
