@@ -199,8 +199,7 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     if (options.renderer == RendererKind::kGather) {
         plan = gather::make_plan(scene, options.width, options.height, options.gather, options.effects,
                                  options.aovs);
-        // Only a list can leave out what the scene has.
-        if (options.effects.kind == gather::EffectRequest::Kind::kList) gather::apply_plan(plan, scene);
+        gather::apply_plan(plan, scene);
     }
     const double load_seconds = clock.lap();
 

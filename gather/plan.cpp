@@ -36,7 +36,7 @@ struct SceneFacts {
     int emissive_instances = 0;
     int mask_parts = 0;
     int blend_parts = 0;
-    int reflecting_parts = 0;  ///< Neither unlit nor black: light that arrives may leave.
+    int reflecting_parts = 0;  ///< Not unlit: light that arrives may leave.
     int smooth_parts = 0;      ///< Parts with a specular lobe that may be smoother than the threshold.
     int specular_parts = 0;
 };
@@ -271,10 +271,15 @@ void apply_plan(const Plan& plan, core::Scene& scene) {
                !plan.on(is_sun ? Effect::kSun : Effect::kPunctualLights);
     });
     if (!plan.on(Effect::kSky) && !scene.sky.black()) scene.sky = core::Sky();
-    for (core::Material& material : scene.materials) {
-        const bool off = (material.alpha_mode == core::AlphaMode::kMask && !plan.on(Effect::kAlphaMask)) ||
-                         (material.alpha_mode == core::AlphaMode::kBlend && !plan.on(Effect::kAlphaBlend));
-        if (off) material.alpha_mode = core::AlphaMode::kOpaque;
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+        for (std::uint32_t part = 0; part < scene.instances[i].materials.size(); ++part) {
+            if (!core::may_be_invisible(scene, i, part)) continue;
+            core::Material& material = scene.materials[scene.instances[i].materials[part]];
+            const bool masks = material.alpha_mode == core::AlphaMode::kMask;
+            if (!plan.on(masks ? Effect::kAlphaMask : Effect::kAlphaBlend)) {
+                material.alpha_mode = core::AlphaMode::kOpaque;
+            }
+        }
     }
 }
 
