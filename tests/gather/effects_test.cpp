@@ -103,6 +103,16 @@ TEST(Effects, AutoEqualsAllInEveryLayer) {
     }
 }
 
+TEST(Effects, AutoEqualsAllInTheDarkWithEachLayerAlone) {
+    gather::Settings settings;
+    settings.frames = 2;
+    for (const char* layer : {"BentNormal", "Probes", "RaysPerTexel", "ProbeWeight"}) {
+        SCOPED_TRACE(layer);
+        expect_same(render(dark_room(), settings, "auto", {layer}).frame.image,
+                    render(dark_room(), settings, "all", {layer}).frame.image);
+    }
+}
+
 /// Without emissive_sampling emitters are only found by being hit, whatever lighting.sampled_emitters is.
 TEST(Effects, AListWithoutEmissiveSamplingHoldsUnderEverySetting) {
     const core::Scene scene = tests::area_lit_room();
