@@ -68,8 +68,9 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
                                                     glm::ivec2(visible.width, visible.height) - 1);
                 const std::size_t there = visible.index(moved.x, moved.y);
                 if (visible.surface(there) &&
-                    plane_weight(point.position, point.geometric_normal, visible.depth[pixel],
-                                 visible.points[there].position, in.probes.plane_sharpness) > kSamePlane) {
+                    surface_weight(point.position, point.geometric_normal, visible.depth[pixel],
+                                   visible.points[there].position, visible.points[there].geometric_normal,
+                                   in.probes.plane_sharpness) > kSamePlane) {
                     reader.pixel = glm::vec2(moved);
                 }
             }

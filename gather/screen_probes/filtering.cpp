@@ -45,8 +45,9 @@ void filter_probes(const ScreenProbeSettings& settings, const TexelTable& table,
                         const auto n = static_cast<std::size_t>(y * atlas.tiles_x + x);
                         const Probe& other = atlas.probes[n];
                         if (n == p || !other.valid()) continue;
-                        const float plane = plane_weight(own.position, own.normal, own.depth, other.position,
-                                                         settings.plane_sharpness);
+                        const float plane =
+                            surface_weight(own.position, own.normal, own.depth, other.position, other.normal,
+                                           settings.plane_sharpness);
                         if (!(plane > kLeastPlaneWeight)) continue;
                         const glm::vec3 offset = other.position - own.position;
                         for (std::size_t t = 0; t < texels; ++t) {

@@ -75,8 +75,8 @@ core::Sh accumulate_brdf(const VisibleSurfaces& visible, const Probe& probe, int
         const std::size_t pixel = visible.index(x, y);
         if (!visible.surface(pixel)) return;
         const core::SurfacePoint& point = visible.points[pixel];
-        const float weight = plane_weight(point.position, point.geometric_normal, visible.depth[pixel],
-                                          probe.position, plane_sharpness);
+        const float weight = surface_weight(point.position, point.geometric_normal, visible.depth[pixel],
+                                            probe.position, probe.normal, plane_sharpness);
         if (!(weight > 0.01f)) return;
         total += weight;
         add(point.frame.normal, weight);

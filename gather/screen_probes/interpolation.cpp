@@ -13,6 +13,17 @@ constexpr float kLeastCorner = 1e-3f;
 /// Below this no probe lies in the point's plane.
 constexpr float kLeastSupport = 1e-6f;
 
+/// Normals across a convex edge whose cosine is less share nothing.
+constexpr float kLeastConvexCosine = 0.5f;
+
+/// @param offset from the point with the first normal to the one with the second
+float convexity_weight(const glm::vec3& offset, const glm::vec3& normal, const glm::vec3& other) {
+    // The sum of what each lies above the other's plane: below 0 the surface between them is convex.
+    if (!(glm::dot(offset, normal - other) < 0.0f)) return 1.0f;
+    return glm::clamp((glm::dot(normal, other) - kLeastConvexCosine) / (1.0f - kLeastConvexCosine), 0.0f,
+                      1.0f);
+}
+
 float tent(const glm::vec2& offset, float radius) {
     const glm::vec2 t = glm::max(glm::vec2(0.0f), 1.0f - glm::abs(offset) / radius);
     return t.x * t.y;
@@ -20,10 +31,11 @@ float tent(const glm::vec2& offset, float radius) {
 
 }  // namespace
 
-float plane_weight(const glm::vec3& position, const glm::vec3& normal, float depth, const glm::vec3& other,
-                   float sharpness) {
-    const float distance = glm::dot(other - position, normal) / depth;
-    return std::exp2(-sharpness * distance * distance);
+float surface_weight(const glm::vec3& position, const glm::vec3& normal, float depth, const glm::vec3& other,
+                     const glm::vec3& other_normal, float sharpness) {
+    const glm::vec3 offset = other - position;
+    const float distance = glm::dot(offset, normal) / depth;
+    return std::exp2(-sharpness * distance * distance) * convexity_weight(offset, normal, other_normal);
 }
 
 ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, float sharpness) {
@@ -32,19 +44,23 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
     const glm::ivec2 tile(static_cast<int>(reader.pixel.x) / atlas.spacing,
                           static_cast<int>(reader.pixel.y) / atlas.spacing);
     std::uint32_t nearest = 0;
-    float nearest_distance = std::numeric_limits<float>::infinity();
+    float least_badness = std::numeric_limits<float>::infinity();
     const auto consider = [&](std::uint32_t index, float least) {
         const Probe& probe = atlas.probes[index];
         if (!probe.valid()) return;
-        const float distance = std::abs(glm::dot(probe.position - reader.position, reader.normal));
-        if (distance < nearest_distance) {
-            nearest_distance = distance;
+        const glm::vec3 offset = probe.position - reader.position;
+        const float distance = std::abs(glm::dot(offset, reader.normal));
+        const float convexity = convexity_weight(offset, reader.normal, probe.normal);
+        // Round a convex edge only where there is no other.
+        const float badness = distance + (1.0f - convexity) * reader.depth;
+        if (badness < least_badness) {
+            least_badness = badness;
             nearest = index;
         }
         const float corner = std::max(least, tent(glm::vec2(probe.pixel) - reader.pixel, spacing));
         if (!(corner > 0.0f) || result.count == ProbeWeights::kMost) return;
-        const float weight =
-            corner * plane_weight(reader.position, reader.normal, reader.depth, probe.position, sharpness);
+        const float relative = distance / reader.depth;
+        const float weight = corner * std::exp2(-sharpness * relative * relative) * convexity;
         if (!(weight > 0.0f)) return;
         result.probe[result.count] = index;
         result.weight[result.count++] = weight;
@@ -73,7 +89,7 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
     }
     result.confident = false;
     result.count = 0;
-    if (std::isinf(nearest_distance)) return result;
+    if (std::isinf(least_badness)) return result;
     result.probe[0] = nearest;
     result.weight[0] = 1.0f;
     result.count = 1;
