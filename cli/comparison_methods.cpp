@@ -64,6 +64,7 @@ double median_voxel(const core::Scene& scene, const std::vector<double>& voxel_o
 RenderOptions render_options(const CompareSceneOptions& options, TracerKind kind) {
     RenderOptions render;
     render.scene = options.scene;
+    render.renderer = RendererKind::kPath;
     render.tracer = render.primary = kind;
     render.width = options.width;
     render.height = options.height;

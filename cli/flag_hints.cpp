@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 
+#include "core/support/spelling.h"
+
 namespace cli {
 
 namespace {
@@ -15,13 +17,8 @@ struct LaterFlag {
     const char* part;
 };
 constexpr std::array kLaterFlags = {
-    LaterFlag{"--quality", "the gather renderer"},
-    LaterFlag{"--set", "the gather renderer"},
-    LaterFlag{"--accumulate", "the gather renderer"},
-    LaterFlag{"--effects", "the plan"},
     LaterFlag{"--frames", "animation"},
     LaterFlag{"--fps", "animation"},
-    LaterFlag{"--max-memory", "memory limits"},
 };
 
 std::vector<std::string> verb_names(const CLI::App& app) {
@@ -42,37 +39,6 @@ std::vector<std::string> flag_names(const CLI::App& app) {
 
 }  // namespace
 
-int edit_distance(std::string_view a, std::string_view b) {
-    std::vector<int> before(b.size() + 1), previous(b.size() + 1), current(b.size() + 1);
-    for (std::size_t j = 0; j <= b.size(); ++j) previous[j] = static_cast<int>(j);
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        current[0] = static_cast<int>(i);
-        for (std::size_t j = 1; j <= b.size(); ++j) {
-            current[j] = std::min(
-                {previous[j] + 1, current[j - 1] + 1, previous[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
-            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
-                current[j] = std::min(current[j], before[j - 2] + 1);
-            }
-        }
-        std::swap(before, previous);
-        std::swap(previous, current);
-    }
-    return previous[b.size()];
-}
-
-std::string nearest(std::string_view word, const std::vector<std::string>& candidates) {
-    std::string best;
-    int best_distance = static_cast<int>(word.size() + 2) / 3 + 1;
-    for (const std::string& candidate : candidates) {
-        const int distance = edit_distance(word, candidate);
-        if (distance < best_distance) {
-            best_distance = distance;
-            best = candidate;
-        }
-    }
-    return best;
-}
-
 std::string explain_parse_error(const CLI::App& app, const CLI::ParseError& error,
                                 const std::vector<std::string>& arguments) {
     const std::vector<std::string> verbs = verb_names(app);
@@ -81,7 +47,7 @@ std::string explain_parse_error(const CLI::App& app, const CLI::ParseError& erro
     });
     if (verb_name == arguments.end()) {
         if (arguments.empty()) return "no verb; try: fieldlight --help";
-        const std::string hint = nearest(arguments.front(), verbs);
+        const std::string hint = core::nearest(arguments.front(), verbs);
         return fmt::format("'{}' is not a verb{}; try: fieldlight --help", arguments.front(),
                            hint.empty() ? "" : ", did you mean '" + hint + "'?");
     }
@@ -97,7 +63,7 @@ std::string explain_parse_error(const CLI::App& app, const CLI::ParseError& erro
                                    later.part);
             }
         }
-        const std::string hint = nearest(flag, flags);
+        const std::string hint = core::nearest(flag, flags);
         return fmt::format("{} has no flag {}{}; try: fieldlight {} --help", verb.get_name(), flag,
                            hint.empty() ? "" : ", did you mean " + hint + "?", verb.get_name());
     }

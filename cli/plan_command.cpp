@@ -5,9 +5,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/gather_flags.h"
 #include "cli/options.h"
 #include "cli/scene_setup.h"
-#include "gather/plan.h"
 
 namespace cli {
 
@@ -16,14 +16,13 @@ namespace {
 struct PlanFlags {
     SceneOptions scene;
     std::string size = "1280x720";
-    std::string quality = "medium";
-    std::string effects = "auto";
+    GatherFlags gather;
 };
 
 void run_plan(const Program& program, const PlanFlags& flags) {
     const glm::ivec2 size = parse_size(flags.size);
-    const gather::Settings settings = gather::quality_settings(flags.quality);
-    const gather::EffectRequest request = gather::parse_effects(flags.effects);
+    const gather::Settings settings = flags.gather.settings();
+    const gather::EffectRequest request = flags.gather.effects();
     const core::Scene scene = load_scene(program, flags.scene);
     const gather::Plan plan = gather::make_plan(scene, size.x, size.y, settings, request);
     nlohmann::json effects = nlohmann::json::object();
@@ -50,15 +49,12 @@ void add_plan_command(CLI::App& app, Program& program) {
     add_scene_file(*verb, flags->scene);
     add_scene_options(*verb, flags->scene);
     verb->add_option("--size", flags->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    verb->add_option("--quality", flags->quality, "Row of settings")
-        ->check(CLI::IsMember({"draft", "medium", "high", "ultra"}).description(""))
-        ->capture_default_str();
-    verb->add_option("--effects", flags->effects, "auto, all, or names with commas")->capture_default_str();
+    flags->gather.add_to(*verb);
     add_common_options(*verb, program.common);
     verb->footer(
         "Examples:\n"
         "  fieldlight plan assets/cornell_box.glb\n"
-        "  fieldlight plan room.glb --sun 30,40,60000 --json");
+        "  fieldlight plan room.glb --sun 30,40,60000 --accumulate 1 --json");
     verb->callback([flags, &program] { run_verb(program, [&] { run_plan(program, *flags); }); });
 }
 

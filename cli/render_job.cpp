@@ -13,6 +13,7 @@
 #include "core/support/error.h"
 #include "core/support/memory.h"
 #include "core/support/parallel.h"
+#include "gather/effect_costs.h"
 #include "gather/final_gather.h"
 
 namespace cli {
@@ -28,10 +29,13 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
                              const SceneTracers& tracers, const gather::Plan& plan) {
     nlohmann::json effects = nlohmann::json::object();
     const bool gathers = options.renderer == RendererKind::kGather;
+    const auto costs =
+        gather::effect_costs(plan, frame.passes, options.width, options.height, options.gather);
     for (std::size_t i = 0; i < (gathers ? gather::kEffectCount : 0); ++i) {
         const auto effect = static_cast<gather::Effect>(i);
-        effects[std::string(gather::name_of(effect))] = {{"on", plan.on(effect)},
-                                                         {"reason", plan[effect].reason}};
+        effects[std::string(gather::name_of(effect))] = {
+            {"on", plan.on(effect)},       {"reason", plan[effect].reason}, {"passes", costs[i].passes},
+            {"seconds", costs[i].seconds}, {"rays", costs[i].rays},         {"bytes", costs[i].bytes}};
     }
     nlohmann::json passes = nlohmann::json::array();
     for (const core::PassCost& pass : frame.passes) {
@@ -67,10 +71,7 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
          {{"peak_bytes", peak_memory_bytes()},
           {"sdf_bytes", tracers.sdf ? tracers.sdf->bytes() : 0},
           {"triangle_bytes", tracers.triangle ? tracers.triangle->bytes() : 0},
-          {"probe_bytes",
-           gathers && plan.on(gather::Effect::kScreenProbes)
-               ? gather::FinalGather::cache_bytes(options.width, options.height, options.gather)
-               : 0}}},
+          {"probe_bytes", gather::probe_cache_bytes(plan, options.width, options.height, options.gather)}}},
         {"effects", effects},
         {"nonfinite_pixels", 0}};
 }
@@ -162,12 +163,14 @@ namespace {
 
 /// The picture's size is the caller's choice alone, so it is weighed before anything else is done.
 void require_picture_memory(const RenderOptions& options) {
-    const int width = options.crop.width > 0 ? options.crop.width : options.width;
-    const int height = options.crop.width > 0 ? options.crop.height : options.height;
+    const bool gathers = options.renderer == RendererKind::kGather;
+    // The gather makes the whole picture and cuts the crop out of it.
+    const bool crops = options.crop.width > 0 && !gathers;
+    const int width = crops ? options.crop.width : options.width;
+    const int height = crops ? options.crop.height : options.height;
     const std::uint64_t bytes =
-        options.renderer == RendererKind::kGather
-            ? gather::FinalGather::picture_bytes(options.width, options.height, options.gather, options.aovs)
-            : core::PathTracer::picture_bytes(width, height, options.aovs);
+        gathers ? gather::FinalGather::picture_bytes(width, height, options.gather, options.aovs)
+                : core::PathTracer::picture_bytes(width, height, options.aovs);
     core::require_memory(bytes, fmt::format("'{}': a picture of {} x {} pixels with {} layers",
                                             options.output.string(), width, height, options.aovs.size()));
 }
@@ -194,9 +197,9 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
         choose_camera(program, options.scene, scene, static_cast<double>(options.width) / options.height);
     gather::Plan plan;
     if (options.renderer == RendererKind::kGather) {
-        plan = gather::make_plan(scene, options.width, options.height, options.gather, options.effects);
-        // Only a list can leave out what the scene has.
-        if (options.effects.kind == gather::EffectRequest::Kind::kList) gather::apply_plan(plan, scene);
+        plan = gather::make_plan(scene, options.width, options.height, options.gather, options.effects,
+                                 options.aovs);
+        gather::apply_plan(plan, scene);
     }
     const double load_seconds = clock.lap();
 

@@ -19,9 +19,9 @@
 
 namespace cli {
 
-enum class RendererKind { kPath, kGather };
+enum class RendererKind { kGather, kPath };
 
-/// As the flags spell it: path, gather.
+/// As the flags spell it: gather, path.
 const char* name_of(RendererKind kind);
 
 /// What `fieldlight render` was asked for.
@@ -33,7 +33,7 @@ struct RenderOptions {
     int width = 1280;
     int height = 720;
     core::Crop crop;
-    RendererKind renderer = RendererKind::kPath;
+    RendererKind renderer = RendererKind::kGather;
     gather::Settings gather;        ///< Of the final gather alone.
     gather::EffectRequest effects;  ///< Likewise.
     int samples_per_pixel = 64;     ///< Of the path tracer alone.

@@ -41,6 +41,23 @@ void add_scene(const SceneOptions& scene, std::vector<std::string>& line) {
     add("--fov", fmt::format("{}", scene.fov_degrees));
 }
 
+void add_gather(const RenderOptions& options, std::vector<std::string>& line) {
+    line.insert(line.end(), {"--accumulate", std::to_string(options.gather.frames), "--bounces",
+                             std::to_string(options.gather.bounces)});
+    const auto usual = gather::describe_settings(gather::Settings{});
+    const auto chosen = gather::describe_settings(options.gather);
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+        if (chosen[i].value == usual[i].value) continue;
+        line.insert(line.end(), {"--set", fmt::format("{}={}", chosen[i].name, chosen[i].value)});
+    }
+    if (options.effects.kind == gather::EffectRequest::Kind::kAuto) return;
+    std::vector<std::string_view> effects;
+    for (const gather::Effect effect : options.effects.list) effects.push_back(gather::name_of(effect));
+    line.insert(line.end(), {"--effects", options.effects.kind == gather::EffectRequest::Kind::kAll
+                                              ? "all"
+                                              : fmt::format("{}", fmt::join(effects, ","))});
+}
+
 }  // namespace
 
 std::string render_line(const RenderOptions& options, bool allow_external) {
@@ -53,9 +70,14 @@ std::string render_line(const RenderOptions& options, bool allow_external) {
                      std::to_string(static_cast<int>(options.bake.sample_bits)), "--resolution",
                      std::to_string(options.bake.resolution), "--bake-dir", options.bake_folder.string()});
     }
-    line.insert(line.end(), {"--size", fmt::format("{}x{}", options.width, options.height), "--spp",
-                             std::to_string(options.samples_per_pixel)});
-    if (options.bounces >= 0) line.insert(line.end(), {"--bounces", std::to_string(options.bounces)});
+    line.insert(line.end(), {"--size", fmt::format("{}x{}", options.width, options.height), "--renderer",
+                             name_of(options.renderer)});
+    if (options.renderer == RendererKind::kPath) {
+        line.insert(line.end(), {"--spp", std::to_string(options.samples_per_pixel)});
+        if (options.bounces >= 0) line.insert(line.end(), {"--bounces", std::to_string(options.bounces)});
+    } else {
+        add_gather(options, line);
+    }
     line.insert(line.end(), {"--seed", std::to_string(options.seed)});
     add_scene(options.scene, line);
     if (!options.aovs.empty())

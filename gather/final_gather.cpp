@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <limits>
+#include <utility>
 
 #include "core/support/error.h"
 #include "core/support/parallel.h"
 #include "core/trace/surface.h"
+#include "gather/effect_costs.h"
 #include "gather/integrate/bent_normal.h"
 #include "gather/integrate/integrate.h"
 #include "gather/lighting/scene_lighting.h"
@@ -27,8 +30,12 @@ using Clock = std::chrono::steady_clock;
 /// What each pass of a picture took, by name, in the order of their first call.
 class Ledger {
 public:
+    explicit Ledger(core::StopRequested stop_requested) : stop_requested_(std::move(stop_requested)) {}
+
+    /// @throws core::Interrupted before a pass, when asked to stop
     template <typename Work>
     void time(const char* name, const Work& work) {
+        if (stop_requested_ && stop_requested_()) throw core::Interrupted();
         const auto start = Clock::now();
         const PassRays rays = work();
         const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
@@ -46,6 +53,7 @@ public:
     std::uint64_t exhausted() const { return exhausted_; }
 
 private:
+    core::StopRequested stop_requested_;
     std::vector<core::PassCost> passes_;
     std::uint64_t exhausted_ = 0;
 };
@@ -61,7 +69,8 @@ public:
           hit_lighting_(inputs.scene, inputs.tracer, lighting_,
                         settings.bounces > 0 && lighting_.samples_anything()),
           table_(settings.screen_probes.resolution),
-          accumulation_(inputs.width, inputs.height, inputs.aovs) {}
+          accumulation_(inputs.width, inputs.height, inputs.aovs),
+          ledger_(inputs.stop_requested) {}
 
     /// The frame as an ordered list of passes.
     void render_frame(std::uint32_t frame) {
@@ -88,8 +97,12 @@ public:
 private:
     static LightingSettings lighting_settings(const Settings& settings, const Plan& plan) {
         LightingSettings result = settings.lighting;
-        if (!plan.on(Effect::kEmissiveSampling) && result.sampled_emitters == SampledEmitters::kAuto) {
-            result.sampled_power_share = std::numeric_limits<float>::infinity();
+        if (plan.on(Effect::kEmissiveSampling)) return result;
+        // No emitter has this share. What is sampled of the sky is not this effect's: `all` of it stays all.
+        result.sampled_power_share = std::numeric_limits<float>::infinity();
+        if (result.sampled_emitters == SampledEmitters::kAll) {
+            result.sampled_emitters = SampledEmitters::kAuto;
+            result.sky_peak_ratio = 0.0f;
         }
         return result;
     }
@@ -265,20 +278,12 @@ void check_layers(const std::set<std::string>& layers) {
 
 }  // namespace
 
-std::uint64_t FinalGather::cache_bytes(int width, int height, const Settings& settings) {
-    const glm::ivec2 tiles = tile_grid(width, height, settings.screen_probes.spacing);
-    const std::uint64_t probes = static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y) +
-                                 adaptive_limit(width, height, settings.screen_probes);
-    // This frame's atlas, the last one's, and the filter's copy of a radiance.
-    return probes * 2 * probe_bytes(settings.screen_probes.resolution) +
-           probes * static_cast<std::uint64_t>(settings.screen_probes.resolution) *
-               static_cast<std::uint64_t>(settings.screen_probes.resolution) * (sizeof(glm::vec3) + 2);
-}
-
 std::uint64_t FinalGather::picture_bytes(int width, int height, const Settings& settings,
                                          const std::set<std::string>& aovs) {
     const std::uint64_t pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-    return cache_bytes(width, height, settings) + Accumulation::bytes(width, height, aovs) +
+    Plan everything;
+    for (PlannedEffect& effect : everything.effects) effect.on = true;
+    return probe_cache_bytes(everything, width, height, settings) + Accumulation::bytes(width, height, aovs) +
            pixels *
                (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + sizeof(ProbeWeights) + sizeof(BentNormal));
 }
@@ -289,12 +294,14 @@ core::Frame FinalGather::render(const core::RenderInputs& inputs) {
     Picture picture(inputs, settings_, plan_);
     int done = 0;
     while (done < settings_.frames) {
-        if (inputs.stop_requested && inputs.stop_requested()) throw core::Interrupted();
         const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
         if (done > 0 && inputs.time_budget_seconds > 0.0 && elapsed >= inputs.time_budget_seconds) break;
         picture.render_frame(static_cast<std::uint32_t>(done));
         ++done;
-        if (inputs.progress) inputs.progress("render", static_cast<double>(done) / settings_.frames);
+        if (!inputs.progress) continue;
+        const double by_count = static_cast<double>(done) / settings_.frames;
+        const double by_time = inputs.time_budget_seconds > 0.0 ? elapsed / inputs.time_budget_seconds : 0.0;
+        inputs.progress("render", std::min(1.0, std::max(by_count, by_time)));
     }
     return picture.finish(done);
 }

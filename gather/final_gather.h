@@ -30,10 +30,7 @@ public:
     /// and the crop is cut from it.
     core::Frame render(const core::RenderInputs& inputs) override;
 
-    /// Bytes of the probes' cache of a picture: an upper bound that the settings alone decide.
-    static std::uint64_t cache_bytes(int width, int height, const Settings& settings);
-
-    /// Bytes of everything that a picture of this size takes in memory, its layers included.
+    /// Most bytes that a picture of this size takes in memory under any plan, its layers included.
     static std::uint64_t picture_bytes(int width, int height, const Settings& settings,
                                        const std::set<std::string>& aovs);
 

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/scene/brdf.h"
 #include "core/support/error.h"
 #include "core/trace/surface.h"
 
@@ -35,14 +36,10 @@ struct SceneFacts {
     int emissive_instances = 0;
     int mask_parts = 0;
     int blend_parts = 0;
-    int reflecting_parts = 0;  ///< Neither unlit nor black: light that arrives may leave.
+    int reflecting_parts = 0;  ///< Not unlit: light that arrives may leave.
     int smooth_parts = 0;      ///< Parts with a specular lobe that may be smoother than the threshold.
     int specular_parts = 0;
 };
-
-bool has_specular(const core::Material& material) {
-    return material.metallic > 0.0f || material.specular > 0.0f;
-}
 
 /// Textures and vertex colours only multiply, so a factor is an upper bound of roughness, and 0 a lower one.
 bool may_be_smoother(const core::Material& material, float roughness) {
@@ -67,7 +64,7 @@ SceneFacts find_facts(const core::Scene& scene, const Settings& settings) {
             }
             if (material.unlit) continue;
             ++facts.reflecting_parts;
-            if (!has_specular(material)) continue;
+            if (!core::has_specular(material)) continue;
             ++facts.specular_parts;
             if (may_be_smoother(material, settings.integrate.rough_specular_max)) ++facts.smooth_parts;
         }
@@ -84,8 +81,13 @@ std::string counted(int count, const char* what) {
 class Planner {
 public:
     Planner(const SceneFacts& facts, int width, int height, const Settings& settings,
-            const EffectRequest& request)
-        : facts_(facts), width_(width), height_(height), settings_(settings), request_(request) {}
+            const EffectRequest& request, const std::set<std::string>& layers)
+        : facts_(facts),
+          width_(width),
+          height_(height),
+          settings_(settings),
+          request_(request),
+          layers_(layers) {}
 
     Plan make();
 
@@ -95,14 +97,27 @@ private:
                 std::string cost);
     /// Off whatever was asked for. @return whether it is
     bool forbid(Effect effect, bool forbidden, std::string reason);
+    /// A layer asked for that shows the probes or what is traced beside them; empty if there is none.
+    std::string probe_layer() const;
 
     const SceneFacts& facts_;
     const int width_;
     const int height_;
     const Settings& settings_;
     const EffectRequest& request_;
+    const std::set<std::string>& layers_;
     Plan plan_;
 };
+
+std::string Planner::probe_layer() const {
+    for (const std::string& layer : layers_) {
+        if (layer == "Probes" || layer == "RaysPerTexel" || layer == "ProbeWeight" ||
+            (layer == "BentNormal" && settings_.integrate.bent_normal)) {
+            return layer;
+        }
+    }
+    return {};
+}
 
 bool Planner::forbid(Effect effect, bool forbidden, std::string reason) {
     if (forbidden) plan_.effects[static_cast<std::size_t>(effect)] = {false, std::move(reason), "none"};
@@ -157,8 +172,10 @@ Plan Planner::make() {
     const bool gathers = facts_.reflecting_parts > 0 && light && (settings_.bounces > 0 || found_by_hits);
     const std::size_t tiles = static_cast<std::size_t>((width_ + probes.spacing - 1) / probes.spacing) *
                               static_cast<std::size_t>((height_ + probes.spacing - 1) / probes.spacing);
-    decide(Effect::kScreenProbes, gathers,
-           "surfaces reflect light that comes from other surfaces or from the sky",
+    const std::string shown = probe_layer();
+    decide(Effect::kScreenProbes, gathers || !shown.empty(),
+           gathers ? "surfaces reflect light that comes from other surfaces or from the sky"
+                   : fmt::format("the layer {} shows them, though they gather no light", shown),
            facts_.reflecting_parts == 0 ? "every material is unlit"
            : !light                     ? "nothing shines"
                                         : "no bounce is asked for and nothing is found by being hit",
@@ -202,7 +219,7 @@ Plan Planner::make() {
     }
     if (!forbid(Effect::kTemporal, !settings_.temporal.accumulate, "temporal.accumulate is off")) {
         decide(Effect::kTemporal, settings_.frames > 1,
-               fmt::format("{} frames make the picture", settings_.frames), "there is a single frame",
+               fmt::format("up to {} frames make the picture", settings_.frames), "there is a single frame",
                "a sum a pixel");
     }
     return plan_;
@@ -242,9 +259,9 @@ EffectRequest parse_effects(std::string_view text) {
 }
 
 Plan make_plan(const core::Scene& scene, int width, int height, const Settings& settings,
-               const EffectRequest& request) {
+               const EffectRequest& request, const std::set<std::string>& layers) {
     const SceneFacts facts = find_facts(scene, settings);
-    return Planner(facts, width, height, settings, request).make();
+    return Planner(facts, width, height, settings, request, layers).make();
 }
 
 void apply_plan(const Plan& plan, core::Scene& scene) {
@@ -254,10 +271,15 @@ void apply_plan(const Plan& plan, core::Scene& scene) {
                !plan.on(is_sun ? Effect::kSun : Effect::kPunctualLights);
     });
     if (!plan.on(Effect::kSky) && !scene.sky.black()) scene.sky = core::Sky();
-    for (core::Material& material : scene.materials) {
-        const bool off = (material.alpha_mode == core::AlphaMode::kMask && !plan.on(Effect::kAlphaMask)) ||
-                         (material.alpha_mode == core::AlphaMode::kBlend && !plan.on(Effect::kAlphaBlend));
-        if (off) material.alpha_mode = core::AlphaMode::kOpaque;
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+        for (std::uint32_t part = 0; part < scene.instances[i].materials.size(); ++part) {
+            if (!core::may_be_invisible(scene, i, part)) continue;
+            core::Material& material = scene.materials[scene.instances[i].materials[part]];
+            const bool masks = material.alpha_mode == core::AlphaMode::kMask;
+            if (!plan.on(masks ? Effect::kAlphaMask : Effect::kAlphaBlend)) {
+                material.alpha_mode = core::AlphaMode::kOpaque;
+            }
+        }
     }
 }
 

@@ -58,8 +58,9 @@ struct Plan {
 };
 
 /// Decides from scene and settings, without tracing a ray. @param width, height of the picture in pixels
+/// @param layers wanted beside the beauty: those that show the probes call for them even in the dark
 Plan make_plan(const core::Scene& scene, int width, int height, const Settings& settings,
-               const EffectRequest& request);
+               const EffectRequest& request, const std::set<std::string>& layers = {});
 
 /// Takes out of the scene what the plan leaves out though the scene has it (an effect that a list does not
 /// name): lights, sky, alpha. Under `auto` and `all` it changes nothing. Call it before building tracers.

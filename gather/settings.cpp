@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "core/support/error.h"
+#include "core/support/spelling.h"
 
 namespace gather {
 
@@ -31,17 +32,6 @@ bool parse(std::string_view text, Number& number) {
     const char* end = text.data() + text.size();
     const auto [rest, error] = std::from_chars(text.data(), end, number);
     return error == std::errc() && rest == end && !text.empty();
-}
-
-template <typename Section>
-Knob flag(std::string name, Section Settings::*section, bool Section::*member, std::string meaning) {
-    return {std::move(name), "on|off", std::move(meaning),
-            [=](const Settings& s) { return std::string(s.*section.*member ? "on" : "off"); },
-            [=](Settings& s, std::string_view text) {
-                if (text != "on" && text != "off") return false;
-                s.*section.*member = text == "on";
-                return true;
-            }};
 }
 
 template <typename Section, typename Number>
@@ -78,6 +68,12 @@ Knob choice(std::string name, Section Settings::*section, Value Section::*member
                 }
                 return false;
             }};
+}
+
+template <typename Section>
+Knob flag(std::string name, Section Settings::*section, bool Section::*member, std::string meaning) {
+    return choice<Section, bool>(std::move(name), section, member, {{"on", true}, {"off", false}},
+                                 std::move(meaning));
 }
 
 const std::vector<Knob>& knobs() {
@@ -153,22 +149,6 @@ const std::vector<Knob>& knobs() {
     return table;
 }
 
-/// Levenshtein's distance.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t diagonal = row[0];
-        row[0] = i;
-        for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-            diagonal = row[j];
-            row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-        }
-    }
-    return row[b.size()];
-}
-
 }  // namespace
 
 std::vector<SettingDescription> describe_settings(const Settings& settings) {
@@ -180,22 +160,16 @@ std::vector<SettingDescription> describe_settings(const Settings& settings) {
 }
 
 void set_setting(Settings& settings, std::string_view name, std::string_view value) {
-    const Knob* nearest = nullptr;
-    std::size_t least = 0;
+    std::vector<std::string> names;
     for (const Knob& knob : knobs()) {
-        const std::size_t distance = edit_distance(name, knob.name);
-        if (!nearest || distance < least) {
-            nearest = &knob;
-            least = distance;
-        }
+        names.push_back(knob.name);
+        if (knob.name != name) continue;
+        if (!knob.set(settings, value)) fail(fmt::format("--set {}={}: takes {}", name, value, knob.values));
+        return;
     }
-    if (least > 0) {
-        fail(fmt::format("--set {}: no such setting; the nearest is {} (render --help-settings lists them)",
-                         name, nearest->name));
-    }
-    if (!nearest->set(settings, value)) {
-        fail(fmt::format("--set {}={}: takes {}", name, value, nearest->values));
-    }
+    const std::string meant = core::nearest(name, names);
+    fail(fmt::format("--set {}: no such setting{} (render --help-settings lists them)", name,
+                     meant.empty() ? "" : fmt::format(", did you mean {}?", meant)));
 }
 
 Settings quality_settings(std::string_view quality) {

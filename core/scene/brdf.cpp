@@ -41,10 +41,6 @@ float smith_root(float z, float alpha) {
     return std::sqrt(alpha2 + (1.0f - alpha2) * z * z);
 }
 
-bool has_specular(const Brdf& brdf) {
-    return max_component(brdf.f0) > 0.0f || max_component(brdf.f90) > 0.0f;
-}
-
 /// Chance of sampling the specular lobe, from both lobes' reflectance seen from `outgoing`.
 float specular_probability(const Brdf& brdf, float outgoing_z) {
     if (!has_specular(brdf)) return 0.0f;
@@ -106,6 +102,14 @@ Brdf make_brdf(const MaterialSample& material) {
     brdf.f90 = glm::vec3(glm::mix(material.dielectric_f90, 1.0f, material.metallic));
     brdf.alpha = std::max(kMinimumAlpha, material.roughness * material.roughness);
     return brdf;
+}
+
+bool has_specular(const Brdf& brdf) {
+    return max_component(brdf.f0) > 0.0f || max_component(brdf.f90) > 0.0f;
+}
+
+bool has_specular(const Material& material) {
+    return material.metallic > 0.0f || material.specular > 0.0f;
 }
 
 BrdfEvaluation evaluate(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming) {

@@ -30,6 +30,13 @@ inline constexpr float kMinimumAlpha = 1e-3f;
 
 Brdf make_brdf(const MaterialSample& material);
 
+/// Whether it reflects anything by its coat or as a metal; if not, it is Lambert.
+bool has_specular(const Brdf& brdf);
+
+/// Whether a point of this material may have such a lobe. An index of refraction of 1 takes F0 away and
+/// leaves F90, the reflection at grazing incidence.
+bool has_specular(const Material& material);
+
 /// The parts of the BRDF, 1/sr, without the cosine. Zero unless both directions are above the surface.
 struct BrdfValue {
     glm::vec3 diffuse{0.0f};

@@ -48,10 +48,6 @@ glm::vec3 irradiance(const IntegrateInputs& in, const ProbeWeights& weights, con
     return sum;
 }
 
-bool has_specular(const core::Brdf& brdf) {
-    return brdf.f0.x > 0.0f || brdf.f0.y > 0.0f || brdf.f0.z > 0.0f || brdf.f90.x > 0.0f;
-}
-
 }  // namespace
 
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights) {
@@ -118,7 +114,7 @@ void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeight
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
             if (!visible.surface(pixel)) continue;
             const core::SurfacePoint& point = visible.points[pixel];
-            if (!has_specular(point.brdf)) continue;
+            if (!core::has_specular(point.brdf)) continue;
             const glm::vec3 outgoing = point.frame.to_local(visible.outgoing[pixel]);
             if (!directional || point.roughness > in.settings.rough_specular_max) {
                 specular[pixel] += specular_albedo(point.brdf, outgoing.z) / core::kPi *

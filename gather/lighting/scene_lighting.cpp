@@ -87,7 +87,7 @@ bool any_positive(const glm::vec3& v) {
 
 SceneLighting::SceneLighting(const core::Scene& scene, const core::Tracer& tracer,
                              const LightingSettings& settings)
-    : scene_(scene), everything_(scene), sky_(core::split_sky(scene.sky, sky_ratio(settings))) {
+    : everything_(scene), sky_(core::split_sky(scene.sky, sky_ratio(settings))) {
     const core::DoubleBounds bounds = core::world_bounds(scene);
     const double radius = scene.instances.empty() ? 1.0 : 0.5 * glm::length(bounds.extent());
     trace_limit_ = static_cast<float>(std::min(4.0 * radius, 1e30));

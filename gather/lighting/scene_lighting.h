@@ -51,7 +51,6 @@ public:
     float trace_limit() const { return trace_limit_; }
 
 private:
-    const core::Scene& scene_;
     core::LightSampler everything_;
     core::SkySplit sky_;
     std::vector<std::uint8_t> sampled_emitters_;

@@ -14,7 +14,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-COMMON = ["--size", "320x240", "--spp", "64"]
+COMMON = ["--size", "320x240", "--renderer", "path", "--spp", "64"]
 
 # name, scene ({shared} is $FIELDLIGHT_SHARED), further flags
 PICTURES = [

@@ -21,7 +21,7 @@ from shared_scenes import add_shared_option, scene_files
 # Scenes that the fields of today cannot show as triangles do, each with what was seen in the pictures.
 EXPECTED_DIFFERENCES = {}
 
-ARGUMENTS = ["--size", "256x256", "--spp", "8", "--bounces", "2", "--quiet", "--resolution", "128"]
+ARGUMENTS = ["--size", "256x256", "--renderer", "path", "--spp", "8", "--bounces", "2", "--quiet", "--resolution", "128"]
 
 
 def render(program, scene, output, kind):

@@ -94,8 +94,8 @@ TEST_F(FailedMesh, ThatFitsNoBoundEndsABakeWith71OnceAllOthersAreBaked) {
 
 TEST_F(FailedMesh, IsSaidToBeMissingFromAPicture) {
     const std::string scene = std::string(kThread) + kBlock;
-    const ProgramRun outcome = run(scene, {"render", "scene.obj", "-o", "x.exr", "--size", "16x12", "--spp",
-                                           "1", "--resolution", "8", "--json"});
+    const ProgramRun outcome = run(scene, {"render", "scene.obj", "-o", "x.exr", "--size", "16x12",
+                                           "--accumulate", "1", "--resolution", "8", "--json"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
     EXPECT_NE(outcome.err.find("mesh 'thread': none of its 1 faces can be baked"), std::string::npos)
         << outcome.err;
@@ -106,16 +106,16 @@ TEST_F(FailedMesh, IsSaidToBeMissingFromAPicture) {
 
 TEST_F(FailedMesh, ThatMemoryHasNoRoomForMakesNoPicture) {
     const ProgramRun outcome =
-        run(fine_ball() + kBlock, {"render", "scene.obj", "-o", "x.exr", "--size", "16x12", "--spp", "1",
-                                   "--resolution", "8", "--max-field-bytes", kBytes});
+        run(fine_ball() + kBlock, {"render", "scene.obj", "-o", "x.exr", "--size", "16x12", "--accumulate",
+                                   "1", "--resolution", "8", "--max-field-bytes", kBytes});
     EXPECT_EQ(outcome.exit_code, 71) << outcome.err;
     EXPECT_NE(outcome.err.find("mesh 'ball'"), std::string::npos) << outcome.err;
     EXPECT_FALSE(exists("x.exr"));
 }
 
 TEST_F(FailedMesh, FieldsOfAPictureKeepTheirBound) {
-    const std::vector<std::string> arguments = {"render",       "scene.obj", "-o",    "x.exr",
-                                                "--size",       "16x12",     "--spp", "1",
+    const std::vector<std::string> arguments = {"render",       "scene.obj", "-o",           "x.exr",
+                                                "--size",       "16x12",     "--accumulate", "1",
                                                 "--resolution", "64",        "--json"};
     const auto sdf_bytes = [](const ProgramRun& outcome) {
         EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

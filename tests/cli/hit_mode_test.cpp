@@ -24,10 +24,10 @@ class HitModeFlag : public testing::Test {
 protected:
     ProgramRun render(const std::string& name, std::vector<std::string> more) const {
         std::vector<std::string> arguments = {
-            "render", kScene,      "-o",    (folder_.path() / name).string(),
-            "--json", "--size",    "48x36", "--spp",
-            "2",      "--bounces", "1",     "--resolution",
-            "24",     "--aov",     "Depth"};
+            "render", kScene,         "-o",    (folder_.path() / name).string(),
+            "--json", "--size",       "48x36", "--accumulate",
+            "2",      "--resolution", "24",    "--aov",
+            "Depth"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         return run_program(arguments);
     }

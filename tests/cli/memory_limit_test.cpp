@@ -57,8 +57,8 @@ TEST(MemoryLimit, SweepsEndClearlyForEveryVerbThatWrites) {
     for (const fs::path& path : {picture, preview}) fs::create_directory(path.parent_path());
     // A picture large enough that a preview of it does not fit where it fits itself.
     constexpr std::uint64_t kStep = 12 * kMebibyte;
-    tests::sweep_memory({"render", cornell(), "-o", picture.string(), "--size", "500x400", "--spp", "1",
-                         "--resolution", "24", "--tracer", "triangle"},
+    tests::sweep_memory({"render", cornell(), "-o", picture.string(), "--size", "500x400", "--accumulate",
+                         "1", "--resolution", "24", "--tracer", "triangle"},
                         picture, kStep);
     tests::sweep_memory({"convert", picture.string(), preview.string()}, preview, kStep);
 }

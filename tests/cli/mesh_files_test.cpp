@@ -106,7 +106,7 @@ TEST_F(MeshFiles, BakeMakesTheSameClosedFieldOfEach) {
 }
 
 TEST_F(MeshFiles, RenderMakesTheSamePictureOfEach) {
-    const std::string flags = " --size 24x24 --spp 4 --resolution 24 --quiet --sky 1,1,1 -o ";
+    const std::string flags = " --size 24x24 --accumulate 4 --resolution 24 --quiet --sky 1,1,1 -o ";
     for (const char* name : kNames) {
         ASSERT_EQ(run("render " + path(name) + flags + path(std::string(name) + ".exr")).exit_code, 0)
             << name;

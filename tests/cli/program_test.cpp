@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <vector>
 
-#include "cli/flag_hints.h"
 #include "core/image/exr.h"
 #include "tests/support/shared_data.h"
 
@@ -41,7 +41,7 @@ std::string cornell() {
 TEST(Program, TellsItsVerbsAndFlags) {
     const Outcome help = run("--help");
     EXPECT_EQ(help.exit_code, 0);
-    for (const char* verb : {"bake", "render", "compare", "convert", "inspect"}) {
+    for (const char* verb : {"bake", "render", "compare", "plan", "convert", "inspect"}) {
         EXPECT_NE(help.text.find(verb), std::string::npos) << verb;
         const Outcome verb_help = run(std::string(verb) + " --help");
         EXPECT_EQ(verb_help.exit_code, 0);
@@ -60,10 +60,11 @@ TEST(Program, SaysWhichRendererIsNotBuiltYet) {
 TEST(Program, RefusesWrongFlags) {
     const tests::TemporaryFolder folder;
     const std::string out = " -o " + (folder.path() / "x.exr").string();
-    const std::string quick = " --size 8x8 --spp 1 --tracer triangle";
+    const std::string quick = " --size 8x8 --tracer triangle";
     for (const char* wrong :
-         {" --size 0x9", " --spp 0", " --sun 1,2", " --sky red", " --crop 0,0,9,9", " --eye 0,0,0",
-          " --camera nobody", " --aov Colour", " --eye 0,0,0 --look-at 0,0,0", " --bounces -1"}) {
+         {" --size 0x9", " --renderer path --spp 0", " --accumulate 0", " --quality best", " --set x",
+          " --sun 1,2", " --sky red", " --crop 0,0,9,9", " --eye 0,0,0", " --camera nobody", " --aov Colour",
+          " --eye 0,0,0 --look-at 0,0,0", " --bounces -1"}) {
         const Outcome outcome = run("render " + cornell() + out + quick + wrong);
         EXPECT_EQ(outcome.exit_code, 64) << wrong << ": " << outcome.text;
         EXPECT_FALSE(outcome.text.empty());
@@ -71,31 +72,105 @@ TEST(Program, RefusesWrongFlags) {
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "x.exr")) << "a failed run leaves no file";
 }
 
-TEST(Program, RendersWhatItPromises) {
-    const tests::TemporaryFolder folder;
+/// Renders, and expects what every picture brings whatever made it. @return the statistics
+nlohmann::json render_with(const tests::TemporaryFolder& folder, const std::string& flags) {
     const std::string out = (folder.path() / "x.exr").string();
     const std::string stats = (folder.path() / "x.json").string();
-    const Outcome outcome =
-        run("render " + cornell() + " -o " + out + " --stats " + stats +
-            " --png --size 32x24 --spp 8 --resolution 24 --aov Depth,Normal,Variance,Steps");
-    ASSERT_EQ(outcome.exit_code, 0) << outcome.text;
+    const Outcome outcome = run("render " + cornell() + " -o " + out + " --stats " + stats +
+                                " --png --size 32x24 --resolution 24 " + flags);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+    if (outcome.exit_code != 0) return {};
     EXPECT_TRUE(std::filesystem::exists(folder.path() / "x.png"));
-    const nlohmann::json statistics = nlohmann::json::parse(std::ifstream(stats));
-    for (const char* key :
-         {"schema", "version", "command", "scene", "width", "height", "tracer", "renderer", "threads", "isa",
-          "seconds", "passes", "rays", "rays_per_pixel", "sdf", "memory", "nonfinite_pixels", "saturated"}) {
+    nlohmann::json statistics = nlohmann::json::parse(std::ifstream(stats));
+    for (const char* key : {"schema", "version", "command", "scene", "width", "height", "tracer", "renderer",
+                            "threads", "isa", "seconds", "passes", "rays", "sdf", "rays_per_pixel", "memory",
+                            "effects", "saturated", "nonfinite_pixels"}) {
         EXPECT_TRUE(statistics.contains(key)) << key;
+    }
+    for (const char* key : {"peak_bytes", "sdf_bytes", "probe_bytes"}) {
+        EXPECT_TRUE(statistics["memory"].contains(key)) << key;
+    }
+    for (const char* key : {"load", "bake", "build", "render", "write"}) {
+        EXPECT_TRUE(statistics["seconds"].contains(key)) << key;
     }
     EXPECT_EQ(statistics["tracer"], "sdf");
     EXPECT_GT(statistics["sdf"]["steps"].get<long>(), 0);
     EXPECT_GT(statistics["memory"]["sdf_bytes"].get<long>(), 0);
+    return statistics;
+}
 
-    const Outcome inspected = run("inspect " + out + " --json");
-    ASSERT_EQ(inspected.exit_code, 0);
-    for (const char* channel : {"\"R\"", "\"A\"", "Depth.Z", "Normal.X", "Variance.G", "Steps.Y"}) {
-        EXPECT_NE(inspected.text.find(channel), std::string::npos) << channel;
+void expect_channels(const core::Image& image, const std::vector<std::string>& channels) {
+    for (const std::string& channel : channels) EXPECT_NE(image.find(channel), nullptr) << channel;
+}
+
+TEST(Program, RendersWhatItPromises) {
+    const tests::TemporaryFolder folder;
+    const nlohmann::json statistics =
+        render_with(folder, "--accumulate 2 --aov Depth,Normal,BentNormal,Probes,RaysPerTexel,Steps");
+    EXPECT_EQ(statistics["renderer"], "gather") << "the default";
+    EXPECT_GT(statistics["memory"]["probe_bytes"].get<long>(), 0);
+
+    const core::ExrFile picture = core::read_exr_file(folder.path() / "x.exr");
+    expect_channels(picture.image, {"R", "A", "Depth.Z", "Normal.X", "BentNormal.X", "Probes.R",
+                                    "RaysPerTexel.Y", "Steps.Y"});
+    const Outcome inspected = run("inspect " + (folder.path() / "x.exr").string() + " --json");
+    for (const char* told : {"\"R\"", "Depth.Z", "worldToCamera"}) {
+        EXPECT_NE(inspected.text.find(told), std::string::npos) << told;
     }
-    EXPECT_NE(inspected.text.find("worldToCamera"), std::string::npos);
+    const auto& attributes = picture.info.attributes;
+    for (const char* name : {"worldToCamera", "worldToNDC", "samplesPerPixel", "seed", "sceneHash"}) {
+        EXPECT_EQ(attributes.count(name), 1u) << name;
+    }
+    EXPECT_EQ(attributes.at("renderer"), "gather");
+    EXPECT_EQ(attributes.at("bounces"), "1");
+    EXPECT_EQ(attributes.at("screen_probes.spacing"), "16");
+    for (const auto& [name, effect] : statistics["effects"].items()) {
+        EXPECT_FALSE(effect["reason"].get<std::string>().empty()) << name;
+        if (!effect["on"].get<bool>()) continue;
+        EXPECT_NE((" " + attributes.at("plan") + " ").find(" " + name + " "), std::string::npos) << name;
+    }
+}
+
+TEST(Program, EffectsThatAreOffCostNothing) {
+    const tests::TemporaryFolder folder;
+    for (const char* flags :
+         {"", "--accumulate 1", "--effects emissive_sampling", "--set screen_probes.spatial_filter=off"}) {
+        SCOPED_TRACE(flags);
+        const nlohmann::json statistics = render_with(folder, std::string("--quality draft ") + flags);
+        EXPECT_EQ(statistics["effects"].size(), 13u);
+        for (const auto& [name, effect] : statistics["effects"].items()) {
+            if (effect["on"].get<bool>()) continue;
+            EXPECT_EQ(effect["seconds"].get<double>(), 0.0) << name;
+            EXPECT_EQ(effect["rays"], 0) << name;
+            EXPECT_EQ(effect["bytes"], 0) << name;
+            EXPECT_TRUE(effect["passes"].empty()) << name;
+        }
+        const bool probes = statistics["effects"]["screen_probes"]["on"].get<bool>();
+        EXPECT_EQ(statistics["memory"]["probe_bytes"].get<long>() > 0, probes);
+        EXPECT_GT(statistics["effects"]["emissive_sampling"]["rays"].get<long>(), 0);
+    }
+}
+
+TEST(Program, RendersByThePathTracerToo) {
+    const tests::TemporaryFolder folder;
+    const nlohmann::json statistics =
+        render_with(folder, "--renderer path --spp 8 --bounces 3 --aov Depth,Variance");
+    EXPECT_EQ(statistics["renderer"], "path");
+    EXPECT_EQ(statistics["samples_per_pixel"], 8);
+    EXPECT_EQ(statistics["memory"]["probe_bytes"], 0);
+    const core::ExrFile picture = core::read_exr_file(folder.path() / "x.exr");
+    expect_channels(picture.image, {"R", "A", "Depth.Z", "Variance.G"});
+    EXPECT_EQ(picture.info.attributes.at("bounces"), "3");
+}
+
+TEST(Program, ABudgetOfTimeAloneDecidesHowMuchIsDone) {
+    const tests::TemporaryFolder folder;
+    for (const char* renderer : {"gather", "path"}) {
+        const std::string flags = std::string("--renderer ") + renderer + " --time-budget 0.3 ";
+        EXPECT_GT(render_with(folder, flags)["samples_per_pixel"].get<double>(), 16.0) << renderer;
+        const std::string most = renderer == std::string("path") ? "--spp 2" : "--accumulate 2";
+        EXPECT_EQ(render_with(folder, flags + most)["samples_per_pixel"], 2) << renderer;
+    }
 }
 
 TEST(Program, BakesNothingForTriangles) {
@@ -103,7 +178,7 @@ TEST(Program, BakesNothingForTriangles) {
     const std::string out = (folder.path() / "x.exr").string();
     const std::string stats = (folder.path() / "x.json").string();
     ASSERT_EQ(run("render " + cornell() + " -o " + out + " --stats " + stats +
-                  " --size 16x16 --spp 1 --tracer triangle --primary triangle")
+                  " --size 16x16 --accumulate 1 --tracer triangle --primary triangle")
                   .exit_code,
               0);
     const nlohmann::json statistics = nlohmann::json::parse(std::ifstream(stats));
@@ -115,30 +190,28 @@ TEST(Program, CropsWhatTheWholePictureShows) {
     const tests::TemporaryFolder folder;
     const std::string whole = (folder.path() / "whole.exr").string();
     const std::string crop = (folder.path() / "crop.exr").string();
-    const std::string common = " --size 32x32 --spp 4 --tracer triangle --quiet -o ";
-    ASSERT_EQ(run("render " + cornell() + common + whole).exit_code, 0);
-    ASSERT_EQ(run("render " + cornell() + common + crop + " --crop 8,4,16,12").exit_code, 0);
-    const core::Image all = core::read_exr(whole);
-    const core::Image part = core::read_exr(crop);
-    ASSERT_EQ(part.width(), 16);
-    ASSERT_EQ(part.height(), 12);
-    // A ray's neighbours in its packet may move its hit by rounding, and with it a path that grazes an edge.
-    int different = 0;
-    for (std::size_t y = 0; y < 12; ++y) {
-        for (std::size_t x = 0; x < 16; ++x) {
-            const float expected = (*all.find("G"))[(y + 4) * 32 + x + 8];
-            if (std::abs((*part.find("G"))[y * 16 + x] - expected) > 1e-4f * (expected + 0.01f)) ++different;
+    for (const char* renderer : {"--accumulate 2", "--renderer path --spp 4"}) {
+        SCOPED_TRACE(renderer);
+        const std::string common =
+            std::string(" --size 32x32 --tracer triangle --quiet ") + renderer + " -o ";
+        ASSERT_EQ(run("render " + cornell() + common + whole).exit_code, 0);
+        ASSERT_EQ(run("render " + cornell() + common + crop + " --crop 8,4,16,12").exit_code, 0);
+        const core::Image all = core::read_exr(whole);
+        const core::Image part = core::read_exr(crop);
+        ASSERT_EQ(part.width(), 16);
+        ASSERT_EQ(part.height(), 12);
+        // A ray's neighbours in its packet may move its hit by rounding, and with it a path that grazes an
+        // edge.
+        int different = 0;
+        for (std::size_t y = 0; y < 12; ++y) {
+            for (std::size_t x = 0; x < 16; ++x) {
+                const float expected = (*all.find("G"))[(y + 4) * 32 + x + 8];
+                const float found = (*part.find("G"))[y * 16 + x];
+                if (std::abs(found - expected) > 1e-4f * (expected + 0.01f)) ++different;
+            }
         }
+        EXPECT_LE(different, 2);
     }
-    EXPECT_LE(different, 2);
-}
-
-TEST(FlagHints, MeasuresEditsWithSwaps) {
-    EXPECT_EQ(cli::edit_distance("tracer", "tracer"), 0);
-    EXPECT_EQ(cli::edit_distance("tracer", "trcaer"), 1);
-    EXPECT_EQ(cli::edit_distance("", "abc"), 3);
-    EXPECT_EQ(cli::nearest("--zzzzzzzz", {"--tracer", "--size"}), "");
-    EXPECT_EQ(cli::nearest("--sise", {"--tracer", "--size"}), "--size");
 }
 
 }  // namespace

@@ -123,6 +123,7 @@ TEST(RenderLine, SurvivesAShell) {
 
 TEST(RenderLine, SaysAllThatDecidesThePixelsAndNoMore) {
     cli::RenderOptions options;
+    options.renderer = cli::RendererKind::kPath;
     options.scene.file = "my room.glb";
     options.output = "x.exr";
     options.tracer = options.primary = cli::TracerKind::kTriangle;
@@ -130,10 +131,9 @@ TEST(RenderLine, SaysAllThatDecidesThePixelsAndNoMore) {
     options.height = 36;
     options.samples_per_pixel = 4;
     options.seed = 9;
-    EXPECT_EQ(
-        cli::render_line(options, false),
-        "fieldlight render 'my room.glb' -o x.exr --tracer triangle --primary triangle --size 64x36 --spp "
-        "4 --seed 9");
+    EXPECT_EQ(cli::render_line(options, false),
+              "fieldlight render 'my room.glb' -o x.exr --tracer triangle --primary triangle --size 64x36 "
+              "--renderer path --spp 4 --seed 9");
     options.tracer = options.primary = cli::TracerKind::kSdf;
     options.bake.resolution = 32;
     options.bake_folder = "fields/32";
@@ -150,9 +150,21 @@ TEST(RenderLine, SaysAllThatDecidesThePixelsAndNoMore) {
               "fieldlight render 'my room.glb' -o x.exr --tracer sdf --primary sdf --hit-mode cubic "
               "--sample-bits 16 "
               "--resolution 32 "
-              "--bake-dir fields/32 --size 64x36 --spp 4 --bounces 0 --seed 9 --scene=attic --sky=1,2,3 "
+              "--bake-dir fields/32 --size 64x36 --renderer path --spp 4 --bounces 0 --seed 9 --scene=attic "
+              "--sky=1,2,3 "
               "--sky-rotation=30.5 --sun=-10,20,3000 --eye=-1,0,0 --look-at=0,0,0 --fov=60 --aov Depth,Steps "
               "--allow-external");
+    options = {};
+    options.scene.file = "room.glb";
+    options.output = "x.exr";
+    options.tracer = options.primary = cli::TracerKind::kTriangle;
+    options.gather.frames = 4;
+    options.gather.screen_probes.spatial_filter = false;
+    options.effects = gather::parse_effects("screen_probes,sun");
+    EXPECT_EQ(cli::render_line(options, false),
+              "fieldlight render room.glb -o x.exr --tracer triangle --primary triangle --size 1280x720 "
+              "--renderer gather --accumulate 4 --bounces 1 --set screen_probes.spatial_filter=off "
+              "--effects sun,screen_probes --seed 0");
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ const std::vector<WritingVerb>& writing_verbs() {
     static const std::vector<WritingVerb> verbs = {
         {"render",
          {"render", "block.obj", "-o", "out/picture.exr", "--png", "--stats", "out/stats.json", "--bake-dir",
-          "out/fields", "--size", "24x16", "--spp", "1", "--resolution", "16", "--threads", "1"},
+          "out/fields", "--size", "24x16", "--accumulate", "1", "--resolution", "16", "--threads", "1"},
          {"out/fields/block_0.vdb", "out/picture.exr", "out/picture.png", "out/stats.json"}},
         {"bake",
          {"bake", "block.obj", "-o", "out", "--resolution", "16", "--threads", "1"},

@@ -153,4 +153,22 @@ TEST(Brdf, IsFiniteForMirrorsAndGrazingDirections) {
     }
 }
 
+/// A material whose points may have a specular lobe says so; an index of refraction of 1 has one at grazing.
+TEST(Brdf, MaterialsAndPointsAgreeOnHavingASpecularLobe) {
+    struct Row {
+        float metallic, specular, ior;
+        bool has_specular;
+    };
+    for (const Row& row : {Row{0.0f, 1.0f, 1.5f, true}, Row{0.0f, 1.0f, 1.0f, true},
+                           Row{0.0f, 0.0f, 1.5f, false}, Row{1.0f, 0.0f, 1.5f, true}}) {
+        core::Material material;
+        material.metallic = row.metallic;
+        material.specular = row.specular;
+        material.ior = row.ior;
+        EXPECT_EQ(core::has_specular(material), row.has_specular);
+        EXPECT_EQ(core::has_specular(core::make_brdf(core::sample_material({}, material, {}))),
+                  row.has_specular);
+    }
+}
+
 }  // namespace
