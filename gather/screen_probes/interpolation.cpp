@@ -58,7 +58,6 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
         const Probe& probe = atlas.probes[index];
         if (!probe.valid()) return;
         const glm::vec3 offset = probe.position - reader.position;
-        const glm::vec3 offset = probe.position - reader.position;
         const float distance = plane_distance(offset, reader.normal, probe.normal);
         const float facing = normal_weight(offset, reader.normal, probe.normal);
         // One that faces elsewhere stands in only where there is no other.
