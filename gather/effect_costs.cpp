@@ -22,7 +22,8 @@ std::vector<std::string_view> passes_of(Effect effect) {
             return {"primary", "direct", "trace_probes", "probe_shadows"};
         case Effect::kAlphaMask:
         case Effect::kAlphaBlend:
-            return {"primary", "direct", "trace_probes", "probe_shadows", "bent_normal"};
+            return {"primary",       "direct",      "trace_probes",
+                    "probe_shadows", "bent_normal", "bent_normal_shadows"};
         case Effect::kScreenProbes:
             return {"place_probes", "trace_probes", "probe_shadows", "integrate"};
         case Effect::kAdaptiveProbes:
@@ -34,7 +35,7 @@ std::vector<std::string_view> passes_of(Effect effect) {
         case Effect::kRoughSpecular:
             return {"integrate"};
         case Effect::kBentNormal:
-            return {"bent_normal", "integrate"};
+            return {"bent_normal", "bent_normal_shadows", "integrate"};
         case Effect::kTemporal:
             return {"accumulate"};
     }

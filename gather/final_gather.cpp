@@ -126,6 +126,7 @@ private:
     bool has_last_ = false;
     std::vector<ProbeWeights> weights_;
     std::vector<BentNormal> bent_;
+    std::vector<glm::vec3> near_irradiance_;
 };
 
 void Picture::gather_light(std::uint32_t frame) {
@@ -164,19 +165,30 @@ void Picture::gather_light(std::uint32_t frame) {
             return PassRays{};
         });
     }
+    const IntegrateInputs in{visible_, atlas_, table_, probes, settings_.integrate, inputs_.seed, frame};
+    ledger_.time("integrate", [&] {
+        interpolate_probes(in, weights_);
+        return PassRays{};
+    });
     const bool bent = plan_.on(Effect::kBentNormal);
+    const bool traced = settings_.integrate.near_field == NearField::kTraced;
     if (bent) {
+        BentNormalRays rays;
         ledger_.time("bent_normal", [&] {
-            return trace_bent_normals(inputs_, visible_, settings_.integrate, frame, bent_);
+            const NearLighting near{hit_lighting_, atlas_, weights_};
+            rays = trace_bent_normals(inputs_, visible_, settings_.integrate, frame, traced ? &near : nullptr,
+                                      bent_, near_irradiance_);
+            return PassRays{rays.short_rays, rays.exhausted};
         });
+        if (traced) ledger_.time("bent_normal_shadows", [&] { return PassRays{rays.shadow_rays, 0}; });
     }
     ledger_.time("integrate", [&] {
-        if (bent || settings_.integrate.diffuse == DiffuseIntegral::kSh) project_to_sh(table_, atlas_);
-        const IntegrateInputs in{visible_, atlas_, table_, probes, settings_.integrate, inputs_.seed, frame};
+        const bool cone = bent && !traced;
+        if (cone || settings_.integrate.diffuse == DiffuseIntegral::kSh) project_to_sh(table_, atlas_);
+        static const std::vector<BentNormal> kOpen;
         diffuse_.assign(visible_.depth.size(), glm::vec3(0.0f));
         specular_.assign(visible_.depth.size(), glm::vec3(0.0f));
-        interpolate_probes(in, weights_);
-        integrate_diffuse(in, weights_, bent_, diffuse_);
+        integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_irradiance_, diffuse_);
         integrate_specular(in, weights_, directional, specular_);
         return PassRays{};
     });
@@ -285,7 +297,7 @@ std::uint64_t FinalGather::picture_bytes(int width, int height, const Settings& 
     for (PlannedEffect& effect : everything.effects) effect.on = true;
     return probe_cache_bytes(everything, width, height, settings) + Accumulation::bytes(width, height, aovs) +
            pixels *
-               (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + sizeof(ProbeWeights) + sizeof(BentNormal));
+               (kVisibleSurfaceBytes + 4 * sizeof(glm::vec3) + sizeof(ProbeWeights) + sizeof(BentNormal));
 }
 
 core::Frame FinalGather::render(const core::RenderInputs& inputs) {

@@ -52,6 +52,12 @@ enum class DiffuseIntegral {
     kSum,  ///< The clamped cosine summed over all texels, once a pixel.
 };
 
+/// What the short rays at full resolution do with what they hit.
+enum class NearField {
+    kTraced,       ///< The hit's own light takes the place of the probes' in its direction.
+    kMultiBounce,  ///< Occlusion alone: the probes through a cone, and an estimate of the light sent back.
+};
+
 struct IntegrateSettings {
     DiffuseIntegral diffuse = DiffuseIntegral::kSh;
     bool rough_specular = true;   ///< Reflects the probes in GGX directions; off: E / pi times the albedo.
@@ -60,8 +66,8 @@ struct IntegrateSettings {
     bool bent_normal = true;           ///< Short rays at full resolution restore contact shadows.
     int bent_normal_rays = 4;          ///< A pixel a frame. 1 ... 64.
     float bent_normal_pixels = 16.0f;  ///< Length of those rays on the screen. 1 ... 64.
-    float near_field_albedo_max =
-        0.5f;  ///< Albedo in the multi-bounce approximation is capped here. 0 ... 1.
+    NearField near_field = NearField::kTraced;
+    float near_field_albedo_max = 0.5f;  ///< Caps the albedo in the multi-bounce estimate. 0 ... 1.
 };
 
 struct TemporalSettings {

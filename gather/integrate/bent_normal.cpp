@@ -4,85 +4,186 @@
 #include <atomic>
 #include <cmath>
 
+#include "core/math/octahedral.h"
+#include "core/math/random.h"
 #include "core/math/sampling.h"
 #include "core/scene/camera.h"
 #include "core/support/parallel.h"
 
 namespace gather {
 
-PassRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
-                            const IntegrateSettings& settings, std::uint32_t frame,
-                            std::vector<BentNormal>& result) {
-    enum Dimension : std::uint32_t { kDirection, kAlpha };
-    result.assign(visible.depth.size(), BentNormal{});
-    const core::CameraRays camera(inputs.camera, inputs.width, inputs.height);
-    const glm::vec2 center = 0.5f * glm::vec2(inputs.width, inputs.height);
-    const core::Ray here = camera.ray(center);
-    const core::Ray beside = camera.ray(center + glm::vec2(1.0f, 0.0f));
-    const auto rays_a_pixel = static_cast<std::uint32_t>(settings.bent_normal_rays);
-    std::atomic<std::uint64_t> ray_count{0};
+namespace {
+
+enum Dimension : std::uint32_t { kDirection, kAlpha };
+
+/// Short rays of some rows of pixels, side by side.
+struct ShortRays {
+    core::RayStream rays;
+    std::vector<std::size_t> pixels;
+    std::vector<std::uint32_t> keys;
+    core::HitStream hits;
+    std::vector<std::uint8_t> occluded;
+};
+
+/// Those that hit, with what they bring more than the probes say.
+struct NearHits {
+    core::RayStream rays;
+    core::HitStream hits;
+    std::vector<std::uint32_t> keys;
+    std::vector<std::size_t> pixels;
+    std::vector<glm::vec3> radiance;
+};
+
+class BentNormalPass {
+public:
+    BentNormalPass(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
+                   const IntegrateSettings& settings, std::uint32_t frame)
+        : inputs_(inputs),
+          visible_(visible),
+          settings_(settings),
+          frame_(frame),
+          rays_a_pixel_(static_cast<std::uint32_t>(settings.bent_normal_rays)) {
+        const core::CameraRays camera(inputs.camera, inputs.width, inputs.height);
+        const glm::vec2 center = 0.5f * glm::vec2(inputs.width, inputs.height);
+        const core::Ray here = camera.ray(center);
+        const core::Ray beside = camera.ray(center + glm::vec2(1.0f, 0.0f));
+        pixel_origin_ = beside.origin - here.origin;
+        pixel_direction_ = beside.direction - here.direction;
+    }
+
+    void trace(std::size_t first, std::size_t last, bool closest, ShortRays& out) const;
+    void bend(const ShortRays& in, std::vector<BentNormal>& result) const;
+    void shade(const NearLighting& near, const ShortRays& in, std::vector<glm::vec3>& near_irradiance,
+               HitLightingCounters& counters) const;
+
+private:
+    const core::RenderInputs& inputs_;
+    const VisibleSurfaces& visible_;
+    const IntegrateSettings& settings_;
+    std::uint32_t frame_;
+    std::uint32_t rays_a_pixel_;
+    glm::vec3 pixel_origin_, pixel_direction_;  ///< From the ray of one pixel to its neighbour's.
+};
+
+/// Of the pixels from `first` up to `last`.
+void BentNormalPass::trace(std::size_t first, std::size_t last, bool closest, ShortRays& out) const {
+    const auto width = static_cast<std::size_t>(visible_.width);
+    out.rays.resize((last - first) * rays_a_pixel_);
+    out.pixels.clear();
+    out.keys.clear();
+    for (std::size_t pixel = first; pixel < last; ++pixel) {
+        if (!visible_.surface(pixel)) continue;
+        const core::SurfacePoint& point = visible_.points[pixel];
+        const float length = settings_.bent_normal_pixels *
+                             glm::length(pixel_origin_ + visible_.depth[pixel] * pixel_direction_);
+        const std::uint32_t key = pixel_key(inputs_.seed, static_cast<int>(pixel % width),
+                                            static_cast<int>(pixel / width), kBentNormalUse);
+        for (std::uint32_t k = 0; k < rays_a_pixel_; ++k) {
+            const core::SampleSequence sequence(key, frame_ * rays_a_pixel_ + k);
+            core::Ray ray;
+            ray.origin = visible_.origins[pixel];
+            ray.direction = glm::normalize(
+                point.frame.to_world(core::sample_cosine_hemisphere(sequence.point(kDirection))));
+            // Under the surface itself: no ray, open; what the shading normal leans over is not near.
+            if (!(glm::dot(ray.direction, point.geometric_normal) > 0.0f)) continue;
+            ray.t_max = length;
+            ray.seed = sequence.bits(kAlpha);
+            out.rays.set(out.pixels.size(), ray);
+            out.pixels.push_back(pixel);
+            out.keys.push_back(core::hash_words(key, k));
+        }
+    }
+    out.rays.resize(out.pixels.size());
+    out.occluded.assign(out.pixels.size(), 0);
+    if (out.pixels.empty()) return;
+    if (!closest) {
+        inputs_.tracer.trace_occluded(out.rays, out.occluded);
+        return;
+    }
+    inputs_.tracer.trace_closest(out.rays, out.hits);
+    for (std::size_t i = 0; i < out.pixels.size(); ++i) {
+        out.occluded[i] = out.hits.status[i] == core::HitStatus::kHit ? 1 : 0;
+    }
+}
+
+void BentNormalPass::bend(const ShortRays& in, std::vector<BentNormal>& result) const {
+    const float share = 1.0f / static_cast<float>(rays_a_pixel_);
+    for (std::size_t i = 0; i < in.pixels.size();) {
+        const std::size_t pixel = in.pixels[i];
+        glm::vec3 blocked(0.0f);
+        int blocked_count = 0;
+        for (; i < in.pixels.size() && in.pixels[i] == pixel; ++i) {
+            if (!in.occluded[i]) continue;
+            ++blocked_count;
+            blocked += in.rays.get(i).direction;
+        }
+        if (blocked_count == 0) continue;
+        // The mean of the cosine-weighted hemisphere is 2/3 n; taking the blocked part off it leaves the
+        // open part's, exactly n where nothing is blocked.
+        const glm::vec3& normal = visible_.points[pixel].frame.normal;
+        const glm::vec3 open = (2.0f / 3.0f) * normal - share * blocked;
+        const float length2 = glm::dot(open, open);
+        result[pixel].visibility = std::max(0.0f, 1.0f - share * static_cast<float>(blocked_count));
+        result[pixel].direction = length2 > 1e-12f ? open / std::sqrt(length2) : normal;
+    }
+}
+
+void BentNormalPass::shade(const NearLighting& near, const ShortRays& in,
+                           std::vector<glm::vec3>& near_irradiance, HitLightingCounters& counters) const {
+    NearHits found;
+    const auto count = static_cast<std::size_t>(std::count(in.occluded.begin(), in.occluded.end(), 1));
+    if (count == 0) return;
+    found.rays.resize(count);
+    found.hits.resize(count);
+    found.radiance.resize(count);
+    for (std::size_t i = 0; i < in.pixels.size(); ++i) {
+        if (!in.occluded[i]) continue;
+        found.rays.set(found.pixels.size(), in.rays.get(i));
+        found.hits.set(found.pixels.size(), in.hits.get(i));
+        found.keys.push_back(in.keys[i]);
+        found.pixels.push_back(in.pixels[i]);
+    }
+    counters = near.hit_lighting.shade(found.rays, found.hits, found.keys, frame_, found.radiance);
+    const float share = core::kPi / static_cast<float>(rays_a_pixel_);
+    for (std::size_t i = 0; i < count; ++i) {
+        const ProbeWeights& weights = near.weights[found.pixels[i]];
+        if (weights.count == 0) continue;
+        const glm::vec2 at = core::octahedral_from_direction(found.rays.get(i).direction);
+        glm::vec3 held(0.0f);
+        for (std::size_t k = 0; k < weights.count; ++k) {
+            held += weights.weight[k] * near.atlas.read(weights.probe[k], at);
+        }
+        near_irradiance[found.pixels[i]] += share * (found.radiance[i] - held);
+    }
+}
+
+}  // namespace
+
+BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
+                                  const IntegrateSettings& settings, std::uint32_t frame,
+                                  const NearLighting* near, std::vector<BentNormal>& result,
+                                  std::vector<glm::vec3>& near_irradiance) {
+    result.resize(visible.depth.size());
+    for (std::size_t pixel = 0; pixel < result.size(); ++pixel) {
+        result[pixel] = {visible.surface(pixel) ? visible.points[pixel].frame.normal : BentNormal{}.direction,
+                         1.0f};
+    }
+    near_irradiance.assign(near ? visible.depth.size() : 0, glm::vec3(0.0f));
+    const BentNormalPass pass(inputs, visible, settings, frame);
+    std::atomic<std::uint64_t> short_rays{0}, shadow_rays{0}, exhausted{0};
     core::parallel_for(static_cast<std::size_t>(visible.height), 2, [&](std::size_t begin, std::size_t end) {
         const core::ScopedFlushDenormals flush;
         const auto width = static_cast<std::size_t>(visible.width);
-        core::RayStream rays;
-        std::vector<std::size_t> pixels;
-        rays.resize((end - begin) * width * rays_a_pixel);
-        for (std::size_t pixel = begin * width; pixel < end * width; ++pixel) {
-            if (!visible.surface(pixel)) continue;
-            const core::SurfacePoint& point = visible.points[pixel];
-            const float far = visible.depth[pixel];
-            const float length =
-                settings.bent_normal_pixels *
-                glm::length((beside.origin - here.origin) + far * (beside.direction - here.direction));
-            const std::uint32_t key = pixel_key(inputs.seed, static_cast<int>(pixel % width),
-                                                static_cast<int>(pixel / width), kBentNormalUse);
-            for (std::uint32_t k = 0; k < rays_a_pixel; ++k) {
-                const core::SampleSequence sequence(key, frame * rays_a_pixel + k);
-                core::Ray ray;
-                ray.origin = visible.origins[pixel];
-                ray.direction = glm::normalize(
-                    point.frame.to_world(core::sample_cosine_hemisphere(sequence.point(kDirection))));
-                // Under the surface itself: no ray, open; what the shading normal leans over is not near.
-                if (!(glm::dot(ray.direction, point.geometric_normal) > 0.0f)) continue;
-                ray.t_max = length;
-                ray.seed = sequence.bits(kAlpha);
-                rays.set(pixels.size(), ray);
-                pixels.push_back(pixel);
-            }
-        }
-        rays.resize(pixels.size());
-        std::vector<std::uint8_t> occluded(pixels.size());
-        if (!pixels.empty()) inputs.tracer.trace_occluded(rays, occluded);
-        const float share = 1.0f / static_cast<float>(rays_a_pixel);
-        for (std::size_t i = 0; i < pixels.size();) {
-            const std::size_t pixel = pixels[i];
-            const glm::vec3& normal = visible.points[pixel].frame.normal;
-            glm::vec3 blocked(0.0f);
-            int blocked_count = 0;
-            for (; i < pixels.size() && pixels[i] == pixel; ++i) {
-                if (!occluded[i]) continue;
-                ++blocked_count;
-                blocked += glm::vec3(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
-            }
-            if (blocked_count == 0) {
-                result[pixel] = {normal, 1.0f};
-                continue;
-            }
-            // The mean of the cosine-weighted hemisphere is 2/3 n; taking the blocked part off it leaves the
-            // open part's, exactly n where nothing is blocked.
-            const glm::vec3 open = (2.0f / 3.0f) * normal - share * blocked;
-            const float length2 = glm::dot(open, open);
-            result[pixel].visibility = std::max(0.0f, 1.0f - share * static_cast<float>(blocked_count));
-            result[pixel].direction = length2 > 1e-12f ? open / std::sqrt(length2) : normal;
-        }
-        for (std::size_t pixel = begin * width; pixel < end * width; ++pixel) {
-            if (visible.surface(pixel) && result[pixel].visibility == 1.0f) {
-                result[pixel].direction = visible.points[pixel].frame.normal;
-            }
-        }
-        ray_count += pixels.size();
+        ShortRays found;
+        pass.trace(begin * width, end * width, near != nullptr, found);
+        pass.bend(found, result);
+        HitLightingCounters counters;
+        if (near) pass.shade(*near, found, near_irradiance, counters);
+        short_rays += found.pixels.size();
+        shadow_rays += counters.shadow_rays;
+        exhausted += counters.exhausted;
     });
-    return {ray_count, 0};
+    return {short_rays, shadow_rays, exhausted};
 }
 
 float multi_bounce(float visibility, float albedo) {

@@ -1,17 +1,23 @@
-// gather/integrate/bent_normal.h: near occlusion at full resolution, and irradiance through what is left
-// open.
+// gather/integrate/bent_normal.h: what stands near a pixel, at full resolution.
 //
-// Short rays restore what probes some pixels apart cannot hold: contact shadows. The probes' light is the far
-// field; what nearby surfaces send back is estimated by the multi-bounce approximation (Jimenez, Wu, Pesce
-// and Jarabo, "Practical Realtime Strategies for Accurate Indirect Occlusion", 2016), after Mayaux,
-// "Horizon-Based Indirect Lighting", 2018.
+// Short rays restore what probes some pixels apart cannot hold: contact shadows, and light from nearby. The
+// probes' light is the far field. Of the near field there are two accounts:
+// - traced: where a short ray hits, the hit's own light takes the place of what the probes hold in its
+//   direction. It is a control variate: its mean is right whatever the probes say of near things, and it has
+//   no noise where nothing is near.
+// - multi_bounce: the probes through a cone about the opening, and what nearby surfaces send back estimated
+//   (Jimenez, Wu, Pesce and Jarabo, "Practical Realtime Strategies for Accurate Indirect Occlusion", 2016),
+//   after Mayaux, "Horizon-Based Indirect Lighting", 2018. No shadow rays, and no noise but of the opening.
 #pragma once
 
 #include <glm/glm.hpp>
 #include <vector>
 
 #include "core/math/spherical_harmonics.h"
+#include "gather/lighting/scene_lighting.h"
 #include "gather/lighting/visible_surfaces.h"
+#include "gather/screen_probes/interpolation.h"
+#include "gather/screen_probes/probe_atlas.h"
 #include "gather/settings.h"
 
 namespace gather {
@@ -22,11 +28,27 @@ struct BentNormal {
     float visibility = 1.0f;                ///< 1 - the cosine-weighted share that is occluded.
 };
 
+/// What `traced` compares: the light of hits with that of the probes.
+struct NearLighting {
+    const HitLighting& hit_lighting;
+    const ProbeAtlas& atlas;
+    const std::vector<ProbeWeights>& weights;  ///< A pixel's.
+};
+
+struct BentNormalRays {
+    std::uint64_t short_rays = 0;
+    std::uint64_t shadow_rays = 0;
+    std::uint64_t exhausted = 0;
+};
+
 /// Traces `integrate.bent_normal_rays` short rays a pixel. Their length is what `bent_normal_pixels` span on
 /// the screen at the pixel's distance.
-PassRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
-                            const IntegrateSettings& settings, std::uint32_t frame,
-                            std::vector<BentNormal>& result);
+/// @param near nullptr: hits are not shaded
+/// @param near_irradiance what to add to each pixel's irradiance, of either sign; left empty without `near`
+BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
+                                  const IntegrateSettings& settings, std::uint32_t frame,
+                                  const NearLighting* near, std::vector<BentNormal>& result,
+                                  std::vector<glm::vec3>& near_irradiance);
 
 /// Ambient occlusion with the light that nearby surfaces of this albedo send back.
 float multi_bounce(float visibility, float albedo);

@@ -80,7 +80,8 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
 }
 
 void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
-                       const std::vector<BentNormal>& bent, std::vector<glm::vec3>& diffuse) {
+                       const std::vector<BentNormal>& bent, const std::vector<glm::vec3>& near_irradiance,
+                       std::vector<glm::vec3>& diffuse) {
     const VisibleSurfaces& visible = in.visible;
     core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
         std::vector<float> cosine_weights;
@@ -99,6 +100,7 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
                 const core::ShColor sh = mix_sh(in.atlas, weights[pixel]);
                 arriving = cone_irradiance(sh, bent[pixel]) + (near - v) * arriving;
             }
+            if (!near_irradiance.empty()) arriving += near_irradiance[pixel];
             diffuse[pixel] += albedo / core::kPi * arriving;
         }
     });

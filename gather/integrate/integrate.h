@@ -26,9 +26,11 @@ struct IntegrateInputs {
 /// Which probes every pixel reads.
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights);
 
-/// Light that the diffuse lobe sends to the eye, added to `diffuse`. @param bent empty: everything is open
+/// Light that the diffuse lobe sends to the eye, added to `diffuse`. @param bent what the probes are
+/// seen through; empty: everything is open. @param near_irradiance added to the probes'; may be empty
 void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
-                       const std::vector<BentNormal>& bent, std::vector<glm::vec3>& diffuse);
+                       const std::vector<BentNormal>& bent, const std::vector<glm::vec3>& near_irradiance,
+                       std::vector<glm::vec3>& diffuse);
 
 /// Light of the specular lobe. Surfaces smoother than settings.rough_specular_max reflect the probes in
 /// visible-normal GGX directions where `directional`; all others E / pi times the lobe's albedo.

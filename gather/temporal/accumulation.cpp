@@ -53,12 +53,13 @@ core::Image Accumulation::develop(int frame_count) const {
         for (std::size_t i = 0; i < count; ++i) colors[i] = color(sums_[i]) * scale;
         image.add_color(layer, colors);
     };
-    add_color("", [](const Sum& s) { return s.direct + s.indirect_diffuse + s.indirect_specular; });
+    // Differences of near light may leave a mean below 0 by their noise; frames are never clamped.
+    const auto diffuse = [](const Sum& s) { return glm::max(s.indirect_diffuse, glm::vec3(0.0f)); };
+    add_color("", [&](const Sum& s) { return s.direct + diffuse(s) + s.indirect_specular; });
     std::vector<float>& alpha = image.add_channel("A");
     for (std::size_t i = 0; i < count; ++i) alpha[i] = sums_[i].surface_count * scale;
     if (layers_.count("Direct")) add_color("Direct", [](const Sum& s) { return s.direct; });
-    if (layers_.count("IndirectDiffuse"))
-        add_color("IndirectDiffuse", [](const Sum& s) { return s.indirect_diffuse; });
+    if (layers_.count("IndirectDiffuse")) add_color("IndirectDiffuse", diffuse);
     if (layers_.count("IndirectSpecular"))
         add_color("IndirectSpecular", [](const Sum& s) { return s.indirect_specular; });
     // Means over the frames in which the pixel saw a surface.
