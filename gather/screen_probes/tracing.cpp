@@ -18,6 +18,9 @@ namespace {
 constexpr std::uint32_t kJitterUse = 0x6d17e2u;
 constexpr std::uint32_t kProbeUse = 0x7ac3b1u;
 
+/// Rays under the surface weigh the same, whatever they find.
+constexpr float kLeastWeight = 1e-6f;
+
 /// Rays of one stream; probes are dealt to streams by this.
 constexpr std::size_t kRaysAtOnce = 8192;
 
@@ -31,37 +34,55 @@ struct Batch {
     std::vector<std::uint32_t> keys;
     std::vector<glm::vec3> radiance;
     std::vector<float> brdf, light;
+    std::vector<float> weights;      ///< A ray's in its texel; see ray_direction().
+    std::vector<float> weight_sums;  ///< A texel's.
 };
 
-/// Places within a texel that a ray tries in turn until it leaves the surface. The same for all probes of a
+/// Places within a texel of which a ray takes one, and the number that takes it. The same for all probes of a
 /// frame, so that the rays of neighbours match.
-using Jitters = std::array<glm::vec2, 8>;
+struct Jitter {
+    std::array<glm::vec2, 8> places;
+    float choice = 0.5f;
+};
 
-Jitters frame_jitters(const ProbeTraceInputs& in) {
-    Jitters jitters;
-    const auto count = static_cast<std::uint32_t>(jitters.size());
-    // Without jitter the centre comes first, and the others are the same in every frame.
+Jitter frame_jitter(const ProbeTraceInputs& in) {
+    Jitter jitter;
+    const auto count = static_cast<std::uint32_t>(jitter.places.size());
+    // Without jitter: the same places in every frame.
     const std::uint32_t frame = in.settings.jitter_directions ? in.frame : 0;
+    const std::uint32_t key = pixel_key(in.inputs.seed, 0, 0, kJitterUse);
     for (std::uint32_t k = 0; k < count; ++k) {
-        jitters[k] = core::SampleSequence(pixel_key(in.inputs.seed, 0, k, kJitterUse), frame).point(0);
+        jitter.places[k] = core::SampleSequence(key, frame * count + k).point(0);
     }
-    if (!in.settings.jitter_directions) jitters[0] = glm::vec2(0.5f);
-    return jitters;
+    jitter.choice = core::SampleSequence(key, frame).point(1).x;
+    return jitter;
 }
 
-/// A direction within the texel of a ray, above the probe's surface if any tried is: what lies under it is
-/// the surface itself, whose own light would shine on it through the texels that straddle its horizon.
-glm::vec3 ray_direction(const ProbeRay& ray, int resolution, const Jitters& jitters,
-                        const glm::vec3& normal) {
+struct WeightedDirection {
+    glm::vec3 direction{0.0f, 0.0f, 1.0f};
+    float weight = 0.0f;  ///< Estimate of the mean cosine over the ray's texel, up to a factor.
+};
+
+/// A direction within the texel of a ray, by the cosine about the probe's normal (resampled: Talbot, Cline
+/// and Egbert, "Importance Resampling for Global Illumination", 2005). So a texel holds the mean light under
+/// the cosine, and its product with the mean cosine is the irradiance that came through it: no grazing light
+/// is taken for light from higher up, and what lies under the surface, which is the surface, does not count.
+WeightedDirection ray_direction(const ProbeRay& ray, int resolution, const Jitter& jitter,
+                                const glm::vec3& normal) {
     const auto edge = static_cast<float>(resolution << ray.level);
-    glm::vec3 first(0.0f);
-    for (std::size_t k = 0; k < jitters.size(); ++k) {
-        const glm::vec3 direction =
-            glm::normalize(core::direction_from_octahedral((glm::vec2(ray.x, ray.y) + jitters[k]) / edge));
-        if (glm::dot(direction, normal) > 0.0f) return direction;
-        if (k == 0) first = direction;
+    std::array<glm::vec3, 8> directions;
+    std::array<float, 8> sums;  // Running.
+    float sum = 0.0f;
+    for (std::size_t k = 0; k < directions.size(); ++k) {
+        directions[k] = glm::normalize(
+            core::direction_from_octahedral((glm::vec2(ray.x, ray.y) + jitter.places[k]) / edge));
+        sum += std::max(0.0f, glm::dot(directions[k], normal));
+        sums[k] = sum;
     }
-    return first;
+    for (std::size_t k = 0; k < directions.size(); ++k) {
+        if (sums[k] > jitter.choice * sum) return {directions[k], sum};
+    }
+    return {directions.front(), 0.0f};
 }
 
 void choose(const ProbeTraceInputs& in, const Probe& probe, std::span<ProbeRay> rays, Batch& batch) {
@@ -85,7 +106,7 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
     const std::size_t texels = atlas.texel_count();
     const std::size_t probes_at_once = std::max<std::size_t>(1, kRaysAtOnce / texels);
     const std::vector<ProbeRay> uniform = uniform_rays(atlas.resolution);
-    const Jitters jitters = frame_jitters(in);
+    const Jitter jitter = frame_jitter(in);
     const std::size_t batches = (atlas.probes.size() + probes_at_once - 1) / probes_at_once;
     std::vector<double> brought(batches, 0.0);
     std::vector<double> removed(batches, 0.0);
@@ -117,12 +138,17 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
             batch.rays.resize(count);
             batch.keys.resize(count);
             batch.radiance.resize(count);
+            batch.weights.resize(count);
+            batch.weight_sums.assign(count, 0.0f);
             for (std::size_t i = 0; i < count; ++i) {
                 const ProbeRay& choice = batch.choice[batch.order[i]];
                 const std::uint32_t probe_index = probe_of[batch.order[i] / texels];
                 const Probe& probe = atlas.probes[probe_index];
                 core::Ray ray;
-                ray.direction = ray_direction(choice, atlas.resolution, jitters, probe.normal);
+                const WeightedDirection chosen =
+                    ray_direction(choice, atlas.resolution, jitter, probe.normal);
+                ray.direction = chosen.direction;
+                batch.weights[i] = chosen.weight;
                 ray.origin = in.visible.origins[in.visible.index(probe.pixel.x, probe.pixel.y)];
                 batch.keys[i] = core::hash_words(
                     pixel_key(in.inputs.seed, probe.pixel.x, probe.pixel.y, kProbeUse), choice.x, choice.y,
@@ -151,19 +177,19 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
                 const float distance = batch.hits.status[i] == core::HitStatus::kHit
                                            ? batch.hits.t[i]
                                            : in.lighting.trace_limit();
-                atlas.radiance[texel] += light;
+                const float weight = std::max(batch.weights[i], kLeastWeight);
+                batch.weight_sums[batch.order[i] / texels * texels + choice.texel(atlas.resolution)] +=
+                    weight;
+                atlas.radiance[texel] += weight * light;
                 atlas.hit_distance[texel] =
                     atlas.ray_count[texel] == 0 ? distance : std::min(atlas.hit_distance[texel], distance);
                 ++atlas.ray_count[texel];
             }
-            for (const std::uint32_t p : probe_of) {
-                for (std::size_t texel = p * texels; texel < (p + 1) * texels; ++texel) {
-                    assert(atlas.ray_count[texel] == 0 || atlas.ray_count[texel] == 1 ||
-                           atlas.ray_count[texel] == 4);
-                    if (atlas.ray_count[texel] > 1) {
-                        atlas.radiance[texel] /= static_cast<float>(atlas.ray_count[texel]);
-                    }
-                }
+            for (std::size_t i = 0; i < count; ++i) {
+                const std::size_t texel = probe_of[i / texels] * texels + i % texels;
+                assert(atlas.ray_count[texel] == 0 || atlas.ray_count[texel] == 1 ||
+                       atlas.ray_count[texel] == 4);
+                if (atlas.ray_count[texel] > 0) atlas.radiance[texel] /= batch.weight_sums[i];
             }
         }
     });
