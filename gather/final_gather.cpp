@@ -17,6 +17,7 @@
 #include "gather/lighting/scene_lighting.h"
 #include "gather/lighting/visible_surfaces.h"
 #include "gather/screen_probes/filtering.h"
+#include "gather/screen_probes/near_field.h"
 #include "gather/screen_probes/placement.h"
 #include "gather/screen_probes/tracing.h"
 #include "gather/temporal/accumulation.h"
@@ -159,6 +160,14 @@ void Picture::gather_light(std::uint32_t frame) {
         return PassRays{cost.probe_rays, cost.exhausted};
     });
     ledger_.time("probe_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
+    const bool bent = plan_.on(Effect::kBentNormal);
+    const bool traced = settings_.integrate.near_field == NearField::kTraced;
+    if (bent && traced) {
+        ledger_.time("filter_probes", [&] {
+            take_out_near_field(probes, visible_, settings_.integrate.bent_normal_pixels, atlas_);
+            return PassRays{};
+        });
+    }
     if (filtered) {
         ledger_.time("filter_probes", [&] {
             filter_probes(probes, table_, atlas_);
@@ -170,8 +179,6 @@ void Picture::gather_light(std::uint32_t frame) {
         interpolate_probes(in, weights_);
         return PassRays{};
     });
-    const bool bent = plan_.on(Effect::kBentNormal);
-    const bool traced = settings_.integrate.near_field == NearField::kTraced;
     if (bent) {
         BentNormalRays rays;
         ledger_.time("bent_normal", [&] {

@@ -180,6 +180,7 @@ Settings quality_settings(std::string_view quality) {
     if (quality == "medium") return settings;
     if (quality == "draft") {
         settings.frames = 4;
+        settings.lighting.direct_samples = 1;
         settings.screen_probes.adaptive_budget = 0.25f;
         settings.integrate.specular_directions = 2;
         settings.integrate.bent_normal_rays = 2;

@@ -42,14 +42,7 @@ public:
           visible_(visible),
           settings_(settings),
           frame_(frame),
-          rays_a_pixel_(static_cast<std::uint32_t>(settings.bent_normal_rays)) {
-        const core::CameraRays camera(inputs.camera, inputs.width, inputs.height);
-        const glm::vec2 center = 0.5f * glm::vec2(inputs.width, inputs.height);
-        const core::Ray here = camera.ray(center);
-        const core::Ray beside = camera.ray(center + glm::vec2(1.0f, 0.0f));
-        pixel_origin_ = beside.origin - here.origin;
-        pixel_direction_ = beside.direction - here.direction;
-    }
+          rays_a_pixel_(static_cast<std::uint32_t>(settings.bent_normal_rays)) {}
 
     void trace(std::size_t first, std::size_t last, bool closest, ShortRays& out) const;
     void bend(const ShortRays& in, std::vector<BentNormal>& result) const;
@@ -62,7 +55,6 @@ private:
     const IntegrateSettings& settings_;
     std::uint32_t frame_;
     std::uint32_t rays_a_pixel_;
-    glm::vec3 pixel_origin_, pixel_direction_;  ///< From the ray of one pixel to its neighbour's.
 };
 
 /// Of the pixels from `first` up to `last`.
@@ -74,8 +66,7 @@ void BentNormalPass::trace(std::size_t first, std::size_t last, bool closest, Sh
     for (std::size_t pixel = first; pixel < last; ++pixel) {
         if (!visible_.surface(pixel)) continue;
         const core::SurfacePoint& point = visible_.points[pixel];
-        const float length = settings_.bent_normal_pixels *
-                             glm::length(pixel_origin_ + visible_.depth[pixel] * pixel_direction_);
+        const float length = settings_.bent_normal_pixels * visible_.footprint.at(visible_.depth[pixel]);
         const std::uint32_t key = pixel_key(inputs_.seed, static_cast<int>(pixel % width),
                                             static_cast<int>(pixel / width), kBentNormalUse);
         for (std::uint32_t k = 0; k < rays_a_pixel_; ++k) {

@@ -59,7 +59,9 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
             if (!visible.surface(pixel)) continue;
             const glm::ivec2 at(pixel % width, pixel / width);
             const core::SurfacePoint& point = visible.points[pixel];
-            ProbeReader reader{glm::vec2(at), point.position, point.geometric_normal, visible.depth[pixel]};
+            ProbeReader reader{
+                glm::vec2(at), point.position, point.geometric_normal, visible.depth[pixel],
+                visible.footprint.at(visible.depth[pixel]) * static_cast<float>(in.atlas.spacing)};
             if (in.probes.jitter_interpolation && in.atlas.spacing > 1) {
                 const core::SampleSequence sequence(pixel_key(in.seed, at.x, at.y, kInterpolationUse),
                                                     in.frame);

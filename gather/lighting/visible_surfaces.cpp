@@ -14,6 +14,14 @@ constexpr int kRowsAtOnce = 2;
 
 }  // namespace
 
+PixelFootprint::PixelFootprint(const core::CameraRays& camera, int width, int height) {
+    const glm::vec2 center = 0.5f * glm::vec2(width, height);
+    const core::Ray here = camera.ray(center);
+    const core::Ray beside = camera.ray(center + glm::vec2(1.0f, 0.0f));
+    origin_ = beside.origin - here.origin;
+    direction_ = beside.direction - here.direction;
+}
+
 void VisibleSurfaces::resize(int new_width, int new_height) {
     width = new_width;
     height = new_height;
@@ -37,6 +45,7 @@ PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLigh
     enum Dimension : std::uint32_t { kFilm, kAlpha };
     result.resize(inputs.width, inputs.height);
     const core::CameraRays camera(inputs.camera, inputs.width, inputs.height);
+    result.footprint = PixelFootprint(camera, inputs.width, inputs.height);
     const bool change_of_tracer = &inputs.primary != &inputs.tracer;
     std::atomic<std::uint64_t> exhausted{0};
     core::parallel_for(

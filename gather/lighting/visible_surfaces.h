@@ -6,15 +6,30 @@
 #include <vector>
 
 #include "core/render/renderer.h"
+#include "core/scene/camera.h"
 #include "core/trace/surface.h"
 #include "gather/lighting/scene_lighting.h"
 
 namespace gather {
 
+/// How large a pixel in the middle of the picture is at some depth.
+class PixelFootprint {
+public:
+    PixelFootprint() = default;
+    PixelFootprint(const core::CameraRays& camera, int width, int height);
+
+    /// In world units. @param depth planar
+    float at(float depth) const { return glm::length(origin_ + depth * direction_); }
+
+private:
+    glm::vec3 origin_{0.0f}, direction_{0.0f};  ///< From the ray of one pixel to its neighbour's.
+};
+
 /// One camera ray a pixel; row-major. Pixels without a surface have depth 0.
 struct VisibleSurfaces {
     int width = 0;
     int height = 0;
+    PixelFootprint footprint;
     std::vector<core::SurfacePoint> points;
     std::vector<glm::vec3> origins;   ///< Where rays leave the surface.
     std::vector<glm::vec3> outgoing;  ///< Unit, towards the camera.

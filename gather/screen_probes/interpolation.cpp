@@ -68,29 +68,19 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
         }
         const float corner = std::max(least, tent(glm::vec2(probe.pixel) - reader.pixel, spacing));
         if (!(corner > 0.0f) || result.count == ProbeWeights::kMost) return;
-        const float weight = corner * weight_at(distance / reader.depth, sharpness) * facing;
+        const float on_surface = corner * weight_at(distance / reader.depth, sharpness) * facing;
+        const float spacings2 = glm::dot(offset, offset) / (reader.spacing * reader.spacing);
+        const float weight = on_surface / (1.0f + spacings2 * spacings2);
         if (!(weight > 0.0f)) return;
         result.probe[result.count] = index;
         result.weight[result.count++] = weight;
         result.support += weight;
+        result.surface_support += on_surface;
     };
-    const glm::ivec2 first = glm::max(tile - 1, glm::ivec2(0));
-    const glm::ivec2 last = glm::min(tile + 1, glm::ivec2(atlas.tiles_x - 1, atlas.tiles_y - 1));
-    for (int y = first.y; y <= last.y; ++y) {
-        for (int x = first.x; x <= last.x; ++x) {
-            consider(static_cast<std::uint32_t>(y * atlas.tiles_x + x),
-                     glm::ivec2(x, y) == tile ? kLeastCorner : 0.0f);
-        }
-    }
-    if (!atlas.adaptive_begin.empty()) {
-        for (int y = first.y; y <= last.y; ++y) {
-            // Tiles of a row are neighbours in the list.
-            const auto row = static_cast<std::size_t>(y * atlas.tiles_x);
-            const std::uint32_t begin = atlas.adaptive_begin[row + static_cast<std::size_t>(first.x)];
-            const std::uint32_t end = atlas.adaptive_begin[row + static_cast<std::size_t>(last.x) + 1];
-            for (std::uint32_t index = begin; index < end; ++index) consider(index, 0.0f);
-        }
-    }
+    const std::size_t own = static_cast<std::size_t>(tile.y * atlas.tiles_x + tile.x);
+    atlas.for_probes_around(glm::ivec2(reader.pixel), [&](std::size_t index) {
+        consider(static_cast<std::uint32_t>(index), index == own ? kLeastCorner : 0.0f);
+    });
     if (result.support > kLeastSupport) {
         for (std::size_t i = 0; i < result.count; ++i) result.weight[i] /= result.support;
         return result;

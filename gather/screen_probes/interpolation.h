@@ -4,12 +4,14 @@
 // surface: probes off the plane of the point do not count, so that a foreground does not leak onto what is
 // behind it. Directions under a probe's own surface bring back that surface, and not what a point beyond the
 // edge sees there. So probes count less as the normals part: not at all from 60 degrees round a convex edge,
-// from 90 in a concave one, where they would bring the light of a lit floor up a dark wall.
+// from 90 in a concave one, where they would bring the light of a lit floor up a dark wall. And on a surface
+// seen at a grazing angle pixels side by side are far apart: probes count less by their distance, too.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 
 #include "gather/screen_probes/probe_atlas.h"
 #include "gather/settings.h"
@@ -22,6 +24,8 @@ struct ProbeReader {
     glm::vec3 position{0.0f};
     glm::vec3 normal{0.0f, 0.0f, 1.0f};
     float depth = 1.0f;
+    /// Between uniform probes on a surface that faces the camera, in world units: farther ones count less.
+    float spacing = std::numeric_limits<float>::infinity();
 };
 
 struct ProbeWeights {
@@ -29,8 +33,9 @@ struct ProbeWeights {
     std::array<std::uint32_t, kMost> probe{};
     std::array<float, kMost> weight{};  ///< They sum to 1 unless count is 0.
     std::size_t count = 0;
-    float support = 0.0f;   ///< Sum of the weights before they were made to sum to 1.
-    bool confident = true;  ///< False: no probe lies in the plane; the nearest to it stands in.
+    float support = 0.0f;          ///< Sum of the weights before they were made to sum to 1,
+    float surface_support = 0.0f;  ///< and without what they lose by distance along the surface.
+    bool confident = true;         ///< False: no probe lies in the plane; the nearest to it stands in.
 };
 
 /// How well the light at one point of a surface stands for the light at another, as said above.

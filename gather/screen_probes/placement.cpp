@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 
 #include "core/math/random.h"
 #include "core/support/parallel.h"
@@ -33,8 +34,9 @@ public:
 
 private:
     bool fails(int x, int y) const;
+    void refine_by(const glm::ivec2& jitter, std::span<const std::uint32_t> order);
     void fill_regions(std::size_t tile, std::vector<Probe>& found) const;
-    void register_adaptive(const std::vector<std::vector<Probe>>& by_tile);
+    void register_adaptive();
 
     template <typename Body>
     void for_tile_pixels(std::size_t tile, const glm::ivec2& offset, int step, const Body& body) const {
@@ -50,6 +52,9 @@ private:
     const VisibleSurfaces& visible_;
     const ScreenProbeSettings& settings_;
     ProbeAtlas& atlas_;
+    std::size_t budget_ = 0;                ///< Adaptive probes still to be had.
+    std::vector<std::vector<Probe>> kept_;  ///< Adaptive probes by tile.
+    bool by_distance_ = false;              ///< Whether probes far along the surface fail, too.
 };
 
 void Placement::place_uniform(const glm::ivec2& jitter) {
@@ -83,9 +88,12 @@ bool Placement::fails(int x, int y) const {
     if (!visible_.surface(pixel)) return false;
     const core::SurfacePoint& point = visible_.points[pixel];
     const ProbeWeights weights =
-        find_probes(atlas_, {glm::vec2(x, y), point.position, point.geometric_normal, visible_.depth[pixel]},
+        find_probes(atlas_,
+                    {glm::vec2(x, y), point.position, point.geometric_normal, visible_.depth[pixel],
+                     visible_.footprint.at(visible_.depth[pixel]) * static_cast<float>(atlas_.spacing)},
                     settings_.plane_sharpness);
-    return !(weights.support >= settings_.adaptive_threshold);
+    const float support = by_distance_ ? weights.support : weights.surface_support;
+    return !(support >= settings_.adaptive_threshold);
 }
 
 void Placement::fill_regions(std::size_t tile, std::vector<Probe>& found) const {
@@ -121,30 +129,39 @@ void Placement::fill_regions(std::size_t tile, std::vector<Probe>& found) const 
     }
 }
 
-void Placement::register_adaptive(const std::vector<std::vector<Probe>>& by_tile) {
+void Placement::register_adaptive() {
     atlas_.probes.resize(atlas_.tile_count());
     atlas_.adaptive_begin.assign(atlas_.tile_count() + 1, 0);
-    for (std::size_t tile = 0; tile < by_tile.size(); ++tile) {
+    for (std::size_t tile = 0; tile < kept_.size(); ++tile) {
         atlas_.adaptive_begin[tile] = static_cast<std::uint32_t>(atlas_.probes.size());
-        atlas_.probes.insert(atlas_.probes.end(), by_tile[tile].begin(), by_tile[tile].end());
+        atlas_.probes.insert(atlas_.probes.end(), kept_[tile].begin(), kept_[tile].end());
     }
     atlas_.adaptive_begin.back() = static_cast<std::uint32_t>(atlas_.probes.size());
 }
 
 void Placement::refine(const glm::ivec2& jitter, std::uint32_t frame) {
-    const std::size_t tiles = atlas_.tile_count();
-    std::size_t budget = adaptive_limit(visible_.width, visible_.height, settings_);
-    std::vector<std::vector<Probe>> kept(tiles);
-    std::vector<std::uint8_t> failed_before(tiles, 0);
+    budget_ = adaptive_limit(visible_.width, visible_.height, settings_);
+    kept_.assign(atlas_.tile_count(), {});
     // A budget that ends in the middle of a level leaves out other tiles in every frame.
-    std::vector<std::uint32_t> order(tiles);
-    for (std::size_t i = 0; i < tiles; ++i) order[i] = static_cast<std::uint32_t>(i);
+    std::vector<std::uint32_t> order(atlas_.tile_count());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
     std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
         const std::uint32_t hash_a = core::hash_words(a, frame);
         const std::uint32_t hash_b = core::hash_words(b, frame);
         return hash_a != hash_b ? hash_a < hash_b : a < b;
     });
-    for (int level = 1; level <= kRefinementLevels + 1 && budget > 0; ++level) {
+    // Surfaces without any probe come first: what is left serves those whose probes are far along the
+    // surface.
+    by_distance_ = false;
+    refine_by(jitter, order);
+    by_distance_ = true;
+    refine_by(jitter, order);
+}
+
+void Placement::refine_by(const glm::ivec2& jitter, std::span<const std::uint32_t> order) {
+    const std::size_t tiles = atlas_.tile_count();
+    std::vector<std::uint8_t> failed_before(tiles, 0);
+    for (int level = 1; level <= kRefinementLevels + 1 && budget_ > 0; ++level) {
         const int step = atlas_.spacing >> level;
         const bool flood = level > kRefinementLevels;
         if (!flood && step < 2) continue;
@@ -162,12 +179,12 @@ void Placement::refine(const glm::ivec2& jitter, std::uint32_t frame) {
             }
         });
         for (const std::uint32_t tile : order) {
-            const std::size_t count = std::min(budget, found[tile].size());
-            kept[tile].insert(kept[tile].end(), found[tile].begin(),
-                              found[tile].begin() + static_cast<std::ptrdiff_t>(count));
-            budget -= count;
+            const std::size_t count = std::min(budget_, found[tile].size());
+            kept_[tile].insert(kept_[tile].end(), found[tile].begin(),
+                               found[tile].begin() + static_cast<std::ptrdiff_t>(count));
+            budget_ -= count;
         }
-        register_adaptive(kept);
+        register_adaptive();
     }
 }
 

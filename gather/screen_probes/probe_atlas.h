@@ -48,6 +48,24 @@ struct ProbeAtlas {
         return {radiance.data() + probe * texel_count(), texel_count()};
     }
 
+    /// Calls `body(index)` for all probes of the 3 x 3 tiles around a pixel, the uniform ones first.
+    template <typename Body>
+    void for_probes_around(const glm::ivec2& pixel, const Body& body) const {
+        const glm::ivec2 tile = pixel / spacing;
+        const glm::ivec2 first = glm::max(tile - 1, glm::ivec2(0));
+        const glm::ivec2 last = glm::min(tile + 1, glm::ivec2(tiles_x, tiles_y) - 1);
+        const auto index = [&](int x, int y) { return static_cast<std::size_t>(y * tiles_x + x); };
+        for (int y = first.y; y <= last.y; ++y) {
+            for (int x = first.x; x <= last.x; ++x) body(index(x, y));
+        }
+        if (adaptive_begin.empty()) return;
+        for (int y = first.y; y <= last.y; ++y) {
+            // Tiles of a row are neighbours in the list.
+            const std::size_t end = adaptive_begin[index(last.x, y) + 1];
+            for (std::size_t i = adaptive_begin[index(first.x, y)]; i < end; ++i) body(i);
+        }
+    }
+
     /// Room for the light of all probes.
     void allocate_texels();
 
