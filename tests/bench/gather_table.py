@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Measures the gather against the path tracer and prints the tables of its proofs.
 
-    tests/bench/gather_table.py budget|truth|ablation|effects|speed [--views NAME,...] [--size WxH] [--readme] ...
+    tests/bench/gather_table.py budget|truth|ablation|effects|proof|speed [--views NAME,...] [--size WxH] [--readme] ...
 
-budget: equal time. truth: cranked up, then each approximation back on. ablation: each technique off alone.
-effects: auto against all on every scene. speed: seconds by pass of a draft frame. Exit code 1 where a gate fails.
+budget: equal time. truth: cranked up, then each approximation back on. ablation: each technique off
+alone. effects: auto against all on every scene. proof:
+where each effect is needed (--seeds 8, --size 160x120). speed: seconds by pass of a draft frame. Exit code 1 where a gate fails.
 Errors are relMSE without the reference's noise (and in truth without the gather's), FLIP, energy bias in %.
 """
 
@@ -70,6 +71,8 @@ def budget(run, options):
                      f"{error:.3g}, {mine['flip']:.3f}, {mine['energy_bias']:+.2f} %",
                      f"{path_error:.3g}, {its['flip']:.3f}, {its['energy_bias']:+.2f} %", f"{ratio:.2f}",
                      f"{flip_ratio:.2f}"])
+        if min(error, path_error) <= 0 or mine["rel_mse_corrected_details"]["low"] <= 0:
+            failed.append(f"{view['name']}: the reference is too noisy to tell; raise --reference-spp")
         if view["diffuse"] and ratio < 4:
             failed.append(f"{view['name']}: relMSE is lower by {ratio:.2f}x, not 4x")
         if flip_ratio < 2:
@@ -147,6 +150,43 @@ def effects(run, options):
                  rows), records, failed
 
 
+def proof(run, options):
+    """For each effect, the first scene where auto drops it and the first that is 20 % worse without it."""
+    places = load_views(options)
+    places += [{"name": name, "scene": str(path), "camera": [], "light": []}
+               for name, path in (scene_files(options.shared) if not options.views else [])]
+    dropped, worse, best = {}, {}, {}
+    for view in places:
+        try:
+            _, stats = run.gather(view)
+            names = [name for name, entry in stats["effects"].items() if entry["on"]]
+            for name in set(stats["effects"]) - set(names):
+                dropped.setdefault(name, view["name"])
+            open_ = [name for name in names if name not in worse]
+            reference = run.reference(view) if open_ else None
+
+            def error(chosen):
+                return statistics.mean(run.compare(run.gather(view, "--effects", ",".join(chosen), seed=seed)[0],
+                                                   reference)["rel_mse"] for seed in range(1, options.seeds + 1))
+            whole = error(names) if open_ else 0
+            for name in open_:
+                gain = error([other for other in names if other != name]) / whole if len(names) > 1 else 0
+                best[name] = max(best.get(name, 0), gain)
+                if gain >= 1.2:
+                    worse[name] = (view["name"], gain)
+        except RuntimeError as fault:
+            print(f"skipped {view['name']}: {fault}", file=sys.stderr)
+        if stats["effects"].keys() == dropped.keys() == worse.keys():
+            break
+    rows, failed = [], []
+    for name in stats["effects"]:
+        scene, gain = worse.get(name, ("", best.get(name, 0)))
+        rows.append([name, dropped.get(name, ""), scene, f"{gain:.2f}"])
+        failed += [f"{name}: {text}" for text, wrong in (("auto drops it nowhere", name not in dropped),
+                   (f"no scene is 20 % worse without it; at most {gain:.2f}x", name not in worse)) if wrong]
+    return table(["effect", "dropped by auto in", "needed in", "relMSE without / with"], rows), rows, failed
+
+
 def pictures_equal(one, other):
     from exr_reader import read_exr
     left, right = read_exr(one), read_exr(other)
@@ -183,7 +223,7 @@ def speed(run, options):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = {"budget": budget, "truth": truth, "ablation": ablation, "effects": effects, "speed": speed}
+    commands = {"budget": budget, "truth": truth, "ablation": ablation, "effects": effects, "proof": proof, "speed": speed}
     parser.add_argument("what", choices=commands)
     add_options(parser)
     parser.add_argument("--seeds", type=int, default=4, help="of truth: pictures of the gather, at least 2")
