@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Renders the README's pictures, each through distance fields and through triangles, into assets/pictures.
 
-    tests/bench/readme_pictures.py [--fieldlight build/release/fieldlight] [--shared DIR] [--only NAME] [--markdown]
+    tests/bench/readme_pictures.py [--fieldlight build/release/fieldlight] [--shared DIR] [--only NAME] [--gather] [--markdown]
 
 --markdown prints the README's table of pictures with their commands and renders nothing.
 """
 
 import argparse
+import json
 import os
 import pathlib
 import subprocess
@@ -35,6 +36,26 @@ def command(program, entry, kind, output, shared):
     return [word.replace("{shared}", shared) for word in words]
 
 
+def render_gather(options, target, folder):
+    """gather | path at equal time | reference, of the views of the gather's proofs."""
+    for view in json.loads((ROOT / "tests/images/views.json").read_text())["views"]:
+        if options.only and options.only != view["name"]:
+            continue
+        scene = view["scene"].replace("shared:", options.shared + "/")
+        seconds = None
+        for kind in ("gather", "path", "reference"):
+            output = pathlib.Path(folder) / f"{view['name']}.{kind}.exr"
+            flags = {"gather": ["--renderer", "gather", "--accumulate", "16"],
+                     "path": ["--renderer", "path", "--spp", "1048576", "--time-budget", str(seconds)],
+                     "reference": ["--renderer", "path", "--spp", "4096", "--seed", "987654"]}[kind]
+            stats = output.with_suffix(".json")
+            subprocess.run([options.fieldlight, "render", scene, "-o", str(output), "--png", "--size", "320x240",
+                            "--tracer", "triangle", "--bounces", "1", "--stats", str(stats)] + view["camera"] +
+                           view["light"] + flags, check=True, cwd=ROOT)
+            seconds = seconds or json.loads(stats.read_text())["seconds"]["render"]
+            (target / f"{view['name']}.{kind}.png").write_bytes(output.with_suffix(".png").read_bytes())
+
+
 def markdown():
     print("| distance fields | triangles |")
     print("|---|---|")
@@ -54,6 +75,7 @@ def main():
     parser.add_argument("--fieldlight", default=str(ROOT / "build/release/fieldlight"))
     parser.add_argument("--shared", default=os.environ.get("FIELDLIGHT_SHARED", str(ROOT.parent / "shared")))
     parser.add_argument("--only")
+    parser.add_argument("--gather", action="store_true", help="the pictures of the gather's proofs instead")
     parser.add_argument("--markdown", action="store_true")
     options = parser.parse_args()
     if options.markdown:
@@ -62,6 +84,9 @@ def main():
     target = ROOT / "assets" / "pictures"
     target.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
+        if options.gather:
+            render_gather(options, target, folder)
+            return 0
         for entry in PICTURES:
             if options.only and options.only != entry[0]:
                 continue

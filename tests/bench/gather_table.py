@@ -1,0 +1,248 @@
+#!/usr/bin/env python3
+"""Measures the gather against the path tracer and prints the tables of its proofs.
+
+    tests/bench/gather_table.py budget|truth|ablation|effects|proof|speed [--views NAME,...] [--size WxH] [--readme] ...
+
+budget: equal time. truth: cranked up, then each approximation back on. ablation: each technique off
+alone. effects: auto against all on every scene. proof:
+where each effect is needed (--seeds 8, --size 160x120). speed: seconds by pass of a draft frame. Exit code 1 where a gate fails.
+Errors are relMSE without the reference's noise (and in truth without the gather's), FLIP, energy bias in %.
+"""
+
+import argparse
+import json
+import pathlib
+import statistics
+import sys
+import tempfile
+
+from exr_reader import squared_bias
+from gather_common import (ROOT, Runner, add_options, corrected, geometric_mean, load_views, scene_of, setting, table,
+                           write_readme)
+from shared_scenes import scene_files
+
+TRUTH = {"screen_probes__spacing": 1, "screen_probes__resolution": 16, "screen_probes__importance_sampling": "off",
+         "screen_probes__spatial_filter": "off", "screen_probes__jitter_interpolation": "off",
+         "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16}
+LEDGER = {
+    "SH3": {"integrate__diffuse": "sh"},
+    "filter": {"screen_probes__spatial_filter": "on"},
+    "culling, with its filter": {"screen_probes__spatial_filter": "on", "screen_probes__importance_sampling": "on"},
+    "bent normal": {"integrate__bent_normal": "on"},
+    "jittered interpolation": {"screen_probes__jitter_interpolation": "on"},
+    "intensity clamp, 100 cd/m^2": {"screen_probes__max_ray_intensity": 100},
+    "spacing 16": {"screen_probes__spacing": 16},
+    "resolution 8": {"screen_probes__resolution": 8},
+}
+TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "screen_probes__lighting_pdf",
+              "screen_probes__spatial_filter", "screen_probes__clamp_hit_distance", "integrate__bent_normal",
+              "screen_probes__jitter_placement", "screen_probes__jitter_directions",
+              "screen_probes__jitter_interpolation", "temporal__accumulate", "integrate__rough_specular"]
+PROBE_PASSES = ("place_probes", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
+
+
+def passes(stats):
+    return {entry["name"]: entry for entry in stats["passes"]}
+
+
+def rays(stats, *names):
+    """Rays a pixel a frame of these passes."""
+    found = passes(stats)
+    pixels = stats["width"] * stats["height"] * stats["samples_per_pixel"]
+    return sum(found[name]["rays"] for name in names if name in found) / pixels
+
+
+def budget(run, options):
+    rows, records, failed = [], [], []
+    for view in load_views(options):
+        reference = run.reference(view)
+        picture, stats = run.gather(view)
+        seconds = stats["seconds"]["render"]
+        other, other_stats = run.path(view, "--spp", 1048576, "--time-budget", seconds)
+        mine, its = run.compare(picture, reference), run.compare(other, reference)
+        error, path_error = corrected(mine), corrected(its)
+        ratio, flip_ratio = path_error / max(error, 1e-9), its["flip"] / max(mine["flip"], 1e-9)
+        records.append({"scene": view["name"], "diffuse": view["diffuse"], "seconds": seconds,
+                        "path_seconds": other_stats["seconds"]["render"], "ratio": ratio, "flip_ratio": flip_ratio,
+                        "gather": mine, "path": its})
+        rows.append([view["name"], f"{seconds:.2f}", f"{rays(stats, 'trace_probes'):.2f}",
+                     f"{rays(stats, 'direct', 'probe_shadows'):.2f}",
+                     f"{rays(stats, 'bent_normal', 'bent_normal_shadows'):.2f}",
+                     f"{error:.3g}, {mine['flip']:.3f}, {mine['energy_bias']:+.2f} %",
+                     f"{path_error:.3g}, {its['flip']:.3f}, {its['energy_bias']:+.2f} %", f"{ratio:.2f}",
+                     f"{flip_ratio:.2f}"])
+        if min(error, path_error) <= 0 or mine["rel_mse_corrected_details"]["low"] <= 0:
+            failed.append(f"{view['name']}: the reference is too noisy to tell; raise --reference-spp")
+        if view["diffuse"] and ratio < 4:
+            failed.append(f"{view['name']}: relMSE is lower by {ratio:.2f}x, not 4x")
+        if flip_ratio < 2:
+            failed.append(f"{view['name']}: FLIP is lower by {flip_ratio:.2f}x, not 2x")
+    mean = geometric_mean([record["ratio"] for record in records if record["diffuse"]])
+    if mean < 10:
+        failed.append(f"diffuse scenes: relMSE is lower by {mean:.2f}x in the geometric mean, not 10x")
+    text = table(["scene", "seconds", "probe rays", "shadow rays", "bent-normal rays a pixel a frame",
+                  "gather: relMSE, FLIP, bias", "path: relMSE, FLIP, bias", "relMSE ratio", "FLIP ratio"], rows)
+    return text + f"\n\nGeometric mean over the diffuse scenes: {mean:.2f}", records, failed
+
+
+def truth(run, options):
+    rows, records, failed = [], [], []
+    for view in load_views(options):
+        cases = [("triangle", "truth", {})] + ([("sdf", "truth", {})] if not options.no_sdf else [])
+        cases += [("triangle", name, change) for name, change in LEDGER.items()]
+        for tracer, name, change in cases:
+            reference = run.reference(view, tracer)
+            pictures = [run.gather(view, *setting(**{**TRUTH, **change}), tracer=tracer, seed=seed)[0]
+                        for seed in range(1, options.seeds + 1)]
+            error = squared_bias(pictures, reference)
+            bias = statistics.mean(run.compare(picture, reference)["energy_bias"] for picture in pictures)
+            records.append({"scene": view["name"], "tracer": tracer, "case": name, "rel_mse": error, "bias": bias})
+            rows.append([view["name"], tracer, name, f"{error:.2e}", f"{bias:+.3f} %"])
+            if name == "truth" and view["diffuse"] and (error > 5e-4 or abs(bias) > 0.5):
+                failed.append(f"{view['name']}, {tracer}: relMSE {error:.2e}, bias {bias:+.3f} %")
+    return table(["scene", "tracer", "settings", "relMSE, both variances subtracted", "bias"], rows), records, failed
+
+
+def ablation(run, options):
+    rows, records = [], []
+    for view in load_views(options):
+        reference = run.reference(view)
+        for name in ["nothing"] + TECHNIQUES:
+            picture, stats = run.gather(view, *([] if name == "nothing" else setting(**{name: "off"})))
+            errors, name = run.compare(picture, reference), name.replace("__", ".")
+            milliseconds = 1000 * stats["seconds"]["render"] / stats["samples_per_pixel"]
+            records.append({"scene": view["name"], "off": name, "ms": milliseconds, "errors": errors,
+                            "probe_rays": rays(stats, "trace_probes")})
+            rows.append([view["name"], name, f"{corrected(errors):.3g}", f"{errors['percentiles']['99']:.3g}",
+                         f"{errors['flip']:.4f}", f"{milliseconds:.1f}", f"{rays(stats, 'trace_probes'):.3f}"])
+    return table(["scene", "off", "relMSE", "P99", "FLIP", "ms a frame", "probe rays a pixel"], rows), records, []
+
+
+def effects(run, options):
+    rows, records, failed = [], [], []
+    scenes = [(path.stem, path) for path in sorted((ROOT / "assets").glob("*.glb"))] + list(scene_files(options.shared))
+    for name, path in scenes:
+        if options.views and name not in options.views.split(","):
+            continue
+        stats, pictures = {}, {}
+        try:
+            for kind in ("auto", "all"):
+                pictures[kind], stats[kind] = run.render(str(path), [
+                    "--renderer", "gather", "--tracer", "triangle", "--primary", "triangle", "--accumulate",
+                    options.frames, "--bounces", 1, "--seed", 1, "--effects", kind])
+        except RuntimeError as error:
+            failed.append(f"{name}: {error}")
+            continue
+        shown = [run.inspect(pictures[kind])["channels"] for kind in ("auto", "all")]
+        bad = sum(channel["nan"] + channel["inf"] for channels in shown for channel in channels)
+        same = pictures_equal(pictures["auto"], pictures["all"])
+        off = [effect for effect, entry in stats["auto"]["effects"].items() if not entry["on"]]
+        costs = [effect for effect in off if any(stats["auto"]["effects"][effect][key] for key in
+                                                 ("seconds", "rays", "bytes"))]
+        records.append({"scene": name, "same": same, "nonfinite": bad, "off": off})
+        rows.append([name] + [f"{stats[kind]['seconds']['render']:.2f}" for kind in ("auto", "all")] +
+                    [stats[kind]["rays"] for kind in ("auto", "all")] +
+                    ["yes" if same else "**no**", bad, ", ".join(off)])
+        failed += [f"{name}: {fault}" for fault, wrong in
+                   (("auto and all differ", not same), (f"{bad} non-finite values", bad),
+                    (f"off and yet costs: {costs}", costs)) if wrong]
+    return table(["scene", "auto s", "all s", "auto rays", "all rays", "same", "non-finite", "off in auto"],
+                 rows), records, failed
+
+
+def proof(run, options):
+    """For each effect, the first scene where auto drops it and the first that is 20 % worse without it."""
+    places = load_views(options)
+    places += [{"name": name, "scene": str(path), "camera": [], "light": []}
+               for name, path in (scene_files(options.shared) if not options.views else [])]
+    dropped, worse, best = {}, {}, {}
+    for view in places:
+        try:
+            _, stats = run.gather(view)
+            names = [name for name, entry in stats["effects"].items() if entry["on"]]
+            for name in set(stats["effects"]) - set(names):
+                dropped.setdefault(name, view["name"])
+            open_ = [name for name in names if name not in worse]
+            reference = run.reference(view) if open_ else None
+
+            def error(chosen):
+                return statistics.mean(run.compare(run.gather(view, "--effects", ",".join(chosen), seed=seed)[0],
+                                                   reference)["rel_mse"] for seed in range(1, options.seeds + 1))
+            whole = error(names) if open_ else 0
+            for name in open_:
+                gain = error([other for other in names if other != name]) / whole if len(names) > 1 else 0
+                best[name] = max(best.get(name, 0), gain)
+                if gain >= 1.2:
+                    worse[name] = (view["name"], gain)
+        except RuntimeError as fault:
+            print(f"skipped {view['name']}: {fault}", file=sys.stderr)
+        if stats["effects"].keys() == dropped.keys() == worse.keys():
+            break
+    rows, failed = [], []
+    for name in stats["effects"]:
+        scene, gain = worse.get(name, ("", best.get(name, 0)))
+        rows.append([name, dropped.get(name, ""), scene, f"{gain:.2f}"])
+        failed += [f"{name}: {text}" for text, wrong in (("auto drops it nowhere", name not in dropped),
+                   (f"no scene is 20 % worse without it; at most {gain:.2f}x", name not in worse)) if wrong]
+    return table(["effect", "dropped by auto in", "needed in", "relMSE without / with"], rows), rows, failed
+
+
+def pictures_equal(one, other):
+    from exr_reader import read_exr
+    left, right = read_exr(one), read_exr(other)
+    return left.keys() == right.keys() and all(left[name].tobytes() == right[name].tobytes() for name in left)
+
+
+def speed(run, options):
+    rows, records, failed = [], [], []
+    for view in load_views(options):
+        cases = {"whole": (1, options.threads), "direct": (0, options.threads), "one": (1, 1), "two": (1, 2)}
+        seconds, last = {name: [] for name in cases}, {}
+        for round_ in range(options.rounds + 1):  # the first warms up
+            for name, (bounces, threads) in cases.items():
+                _, stats = run.render(scene_of(view, options.shared), view["camera"] + view["light"] + [
+                    "--renderer", "gather", "--quality", "draft", "--accumulate", options.frames, "--tracer",
+                    "triangle", "--primary", "triangle", "--bounces", bounces], threads=threads)
+                last[name] = stats
+                if round_:
+                    seconds[name].append(stats["seconds"]["render"])
+        median = {name: statistics.median(values) for name, values in seconds.items()}
+        found = {name: entry["seconds"] for name, entry in passes(last["whole"]).items()}
+        share = sum(found.get(name, 0) for name in PROBE_PASSES if not name.startswith("bent")) / sum(found.values())
+        ratio, scaling = median["whole"] / median["direct"], median["one"] / median["two"]
+        records.append({"scene": view["name"], "median": median, "passes": found, "share": share})
+        by_pass = ", ".join(f"{name} {1000 * value / options.frames:.1f}" for name, value in found.items())
+        rows.append([view["name"], f"{1000 * median['whole'] / options.frames:.1f}", f"{ratio:.2f}", f"{share:.2f}",
+                     f"{scaling:.2f}", f"{last['whole']['memory']['probe_bytes'] / 2**20:.2f}", by_pass])
+        failed += [f"{view['name']}: {text}" for text, wrong in
+                   ((f"{ratio:.2f}x direct light, not 4x", ratio > 4), (f"probe passes take {share:.2f}", share > 0.5),
+                    (f"two threads give {scaling:.2f}x", scaling < 1.8)) if wrong]
+    return table(["scene", "ms a frame", "of direct light", "probe passes but tracing", "one to two threads",
+                  "cache MiB", "ms by pass"], rows), records, failed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = {"budget": budget, "truth": truth, "ablation": ablation, "effects": effects, "proof": proof, "speed": speed}
+    parser.add_argument("what", choices=commands)
+    add_options(parser)
+    parser.add_argument("--seeds", type=int, default=4, help="of truth: pictures of the gather, at least 2")
+    parser.add_argument("--no-sdf", action="store_true", help="of truth: triangles alone")
+    parser.add_argument("--rounds", type=int, default=5, help="of speed")
+    options = parser.parse_args()
+    if options.what == "truth" and options.seeds < 2:
+        parser.error("--seeds is at least 2")
+    with tempfile.TemporaryDirectory() as folder:
+        text, records, failed = commands[options.what](Runner(options, folder), options)
+    print(text)
+    if options.json:
+        pathlib.Path(options.json).write_text(json.dumps(records, indent=1))
+    if options.readme:
+        write_readme(options.what, text)
+    for line in failed:
+        print(f"fails: {line}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
