@@ -68,7 +68,7 @@ public:
           plan_(plan),
           lighting_(inputs.scene, inputs.tracer, lighting_settings(settings, plan)),
           hit_lighting_(inputs.scene, inputs.tracer, lighting_,
-                        settings.bounces > 0 && lighting_.samples_anything()),
+                        settings.bounces > 0 && !lighting_.everything().empty()),
           table_(settings.screen_probes.resolution),
           accumulation_(inputs.width, inputs.height, inputs.aovs),
           ledger_(inputs.stop_requested) {}

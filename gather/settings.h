@@ -20,7 +20,7 @@ enum class SampledEmitters {
 struct LightingSettings {
     SampledEmitters sampled_emitters = SampledEmitters::kAuto;
     float sampled_solid_angle = 2.0f;   ///< Steradians; emitters that look larger are not sampled. 0 ... 13.
-    float sampled_power_share = 1e-3f;  ///< Of all light; emitters with less are not sampled. 0 ... 1.
+    float sampled_power_share = 1e-6f;  ///< Of all light; emitters with less are not sampled. 0 ... 1.
     float sky_peak_ratio = 4.0f;  ///< Sky radiance beyond this multiple of its mean is sampled. 0 ... 1e6.
     int direct_samples = 2;       ///< Lights that a pixel samples a frame. 1 ... 64.
 };

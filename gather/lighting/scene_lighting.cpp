@@ -104,11 +104,11 @@ SceneLighting::SceneLighting(const core::Scene& scene, const core::Tracer& trace
     }
 }
 
-std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::SurfacePoint& surface,
-                                         const glm::vec3& origin, const glm::vec3& outgoing, float u_light,
-                                         const glm::vec2& u_point, std::uint32_t seed) {
+std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::LightSampler& sampler,
+                                         const core::SurfacePoint& surface, const glm::vec3& origin,
+                                         const glm::vec3& outgoing, float u_light, const glm::vec2& u_point,
+                                         std::uint32_t seed) {
     const core::LightReceiver receiver{origin, surface.geometric_normal};
-    const core::LightSampler& sampler = lighting.sampled();
     const core::LightSampler::Sample light =
         sampler.sample(receiver, sampler.selection(receiver), u_light, u_point);
     if (!(light.pdf > 0.0f) || !any_positive(light.radiance) ||
@@ -168,8 +168,8 @@ HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::
         if (!direct_) continue;
         const core::SampleSequence sequence(keys[i], frame);
         const auto arrival =
-            sample_light(lighting_, surface, surface.origin_above(), -ray.direction, sequence.point(kLight).x,
-                         sequence.point(kPoint), sequence.bits(kAlpha));
+            sample_light(lighting_, lighting_.everything(), surface, surface.origin_above(), -ray.direction,
+                         sequence.point(kLight).x, sequence.point(kPoint), sequence.bits(kAlpha));
         if (!arrival) continue;
         shadow_rays.set(target.size(), arrival->shadow_ray);
         target.push_back(static_cast<std::uint32_t>(i));

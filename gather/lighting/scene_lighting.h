@@ -1,7 +1,8 @@
 // gather/lighting/scene_lighting.h: what lights a scene, split into what is sampled and what is hit.
 //
 // Nothing is counted twice: S (lights without a surface, the sun, small bright emitters, peaks of the sky)
-// enters at any vertex only by shadow rays, U (all other emission) only by rays that meet it.
+// enters at any vertex only by shadow rays, U (all other emission) only by rays that meet it. Where a path
+// ends (at what a gathering ray hits) no ray goes on that could meet U: there shadow rays go to both.
 #pragma once
 
 #include <cstdint>
@@ -43,7 +44,11 @@ public:
     /// Whether gathering rays can bring light without any bounce.
     bool gathers_anything() const { return gathers_anything_; }
 
+    /// S, for surfaces whose light is gathered, too.
     const core::LightSampler& sampled() const { return *sampled_; }
+
+    /// S and U, for the ends of paths.
+    const core::LightSampler& everything() const { return everything_; }
 
     float start_offset(std::uint32_t instance) const { return start_offsets_[instance]; }
 
@@ -67,14 +72,15 @@ struct LightArrival {
     glm::vec3 specular{0.0f};  ///< and by the specular one.
 };
 
-/// Chooses one light of S for a surface. Nothing where no light arrives.
+/// Chooses one light of `sampler` for a surface. Nothing where no light arrives.
 /// @param origin where rays leave the surface; `outgoing` unit, away from it
-std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::SurfacePoint& surface,
-                                         const glm::vec3& origin, const glm::vec3& outgoing, float u_light,
-                                         const glm::vec2& u_point, std::uint32_t seed);
+std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::LightSampler& sampler,
+                                         const core::SurfacePoint& surface, const glm::vec3& origin,
+                                         const glm::vec3& outgoing, float u_light, const glm::vec2& u_point,
+                                         std::uint32_t seed);
 
-/// Light that hits send back along their rays: emission of U, and direct light of S by a shadow ray each;
-/// misses bring the sky of U. Of the cached bounce nothing yet: `bounced`, where present, is called for
+/// Light that hits send back along their rays: emission of U, and direct light of S and U by a shadow ray
+/// each; misses bring the sky of U. Of the cached bounce nothing yet: `bounced`, where present, is called for
 /// each hit and its light added.
 struct HitLightingCounters {
     std::uint64_t shadow_rays = 0;

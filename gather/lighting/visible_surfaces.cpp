@@ -112,9 +112,10 @@ PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting&
                 for (int sample = 0; sample < samples; ++sample) {
                     const core::SampleSequence sequence(key, frame * static_cast<std::uint32_t>(samples) +
                                                                  static_cast<std::uint32_t>(sample));
-                    const auto arrival = sample_light(lighting, visible.points[pixel], visible.origins[pixel],
-                                                      visible.outgoing[pixel], sequence.point(kLight).x,
-                                                      sequence.point(kPoint), sequence.bits(kAlpha));
+                    const auto arrival =
+                        sample_light(lighting, lighting.sampled(), visible.points[pixel],
+                                     visible.origins[pixel], visible.outgoing[pixel],
+                                     sequence.point(kLight).x, sequence.point(kPoint), sequence.bits(kAlpha));
                     if (!arrival) continue;
                     rays.set(pixels.size(), arrival->shadow_ray);
                     pixels.push_back(pixel);
