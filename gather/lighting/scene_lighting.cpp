@@ -79,8 +79,29 @@ float sky_ratio(const LightingSettings& settings) {
     return settings.sky_peak_ratio;
 }
 
+/// Rougher lobes are wide enough for light sampling.
+constexpr float kMirrorRoughness = 0.5f;
+
 bool any_positive(const glm::vec3& v) {
     return v.x > 0.0f || v.y > 0.0f || v.z > 0.0f;
+}
+
+/// What a ray chosen by the BRDF brings, weighted against sample_light().
+glm::vec3 light_by_lobe(const core::Scene& scene, const core::LightSampler& sampler, const LobeRay& lobe,
+                        const core::Hit& hit) {
+    glm::vec3 light(0.0f);
+    if (hit.status == core::HitStatus::kHit) {
+        if (!sampler.samples_emitter(hit.instance) || !sampler.emits(hit.instance, hit.triangle))
+            return light;
+        light = core::surface_at(scene, lobe.ray, hit).emission *
+                core::power_heuristic(lobe.chosen.pdf,
+                                      sampler.emitter_pdf(lobe.receiver, lobe.selection, hit.instance,
+                                                          hit.triangle, lobe.ray.direction, hit.t));
+    } else if (hit.status == core::HitStatus::kMiss) {
+        light = sampler.weighted_escaped_radiance(lobe.receiver, lobe.selection, lobe.ray.direction,
+                                                  lobe.chosen.pdf);
+    }
+    return lobe.chosen.value.sum() * (lobe.chosen.incoming.z / lobe.chosen.pdf) * light;
 }
 
 }  // namespace
@@ -116,12 +137,14 @@ std::optional<LightArrival> sample_light(const SceneLighting& lighting, const co
         return std::nullopt;
     }
     const glm::vec3 incoming = surface.frame.to_local(light.direction);
-    const core::BrdfValue brdf =
-        core::evaluate(surface.brdf, surface.frame.to_local(outgoing), incoming).value;
-    const glm::vec3 irradiance = light.radiance * (incoming.z / light.pdf);
+    const core::BrdfEvaluation brdf =
+        core::evaluate(surface.brdf, surface.frame.to_local(outgoing), incoming);
+    const float weight =
+        mirrors_lights(surface) && !light.delta ? core::power_heuristic(light.pdf, brdf.pdf) : 1.0f;
+    const glm::vec3 irradiance = light.radiance * (weight * incoming.z / light.pdf);
     LightArrival result;
-    result.diffuse = brdf.diffuse * irradiance;
-    result.specular = brdf.specular * irradiance;
+    result.diffuse = brdf.value.diffuse * irradiance;
+    result.specular = brdf.value.specular * irradiance;
     if (!any_positive(result.diffuse + result.specular)) return std::nullopt;
     // The ray stops short of the emitter by what the tracer may misplace its surface.
     const float stop_short = light.instance == core::kNoIndex
@@ -135,15 +158,53 @@ std::optional<LightArrival> sample_light(const SceneLighting& lighting, const co
     return result;
 }
 
+bool mirrors_lights(const core::SurfacePoint& surface) {
+    return surface.roughness <= kMirrorRoughness && core::has_specular(surface.brdf);
+}
+
+std::optional<LobeRay> sample_lobe(const core::LightSampler& sampler, const core::SurfacePoint& surface,
+                                   const glm::vec3& origin, const glm::vec3& outgoing, float u_lobe,
+                                   const glm::vec2& u, std::uint32_t seed) {
+    LobeRay result;
+    result.chosen = core::sample(surface.brdf, surface.frame.to_local(outgoing), u_lobe, u);
+    if (!(result.chosen.pdf > 0.0f)) return std::nullopt;
+    result.ray.direction = glm::normalize(surface.frame.to_world(result.chosen.incoming));
+    if (!(glm::dot(result.ray.direction, surface.geometric_normal) > 0.0f)) return std::nullopt;
+    result.ray.origin = origin;
+    result.ray.seed = seed;
+    result.receiver = {origin, surface.geometric_normal};
+    result.selection = sampler.selection(result.receiver);
+    return result;
+}
+
+std::uint64_t trace_lobes(const core::Scene& scene, const core::Tracer& tracer,
+                          const core::LightSampler& sampler, std::span<const LobeRay> lobes,
+                          const std::function<void(std::size_t lobe, const glm::vec3& light)>& add) {
+    if (lobes.empty()) return 0;
+    core::RayStream rays;
+    core::HitStream hits;
+    rays.resize(lobes.size());
+    for (std::size_t i = 0; i < lobes.size(); ++i) rays.set(i, lobes[i].ray);
+    tracer.trace_closest(rays, hits);
+    std::uint64_t exhausted = 0;
+    for (std::size_t i = 0; i < lobes.size(); ++i) {
+        exhausted += hits.status[i] == core::HitStatus::kExhausted ? 1 : 0;
+        add(i, light_by_lobe(scene, sampler, lobes[i], hits.get(i)));
+    }
+    return exhausted;
+}
+
 HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::HitStream& hits,
                                        std::span<const std::uint32_t> keys, std::uint32_t frame,
                                        std::span<glm::vec3> radiance) const {
-    enum Dimension : std::uint32_t { kLight, kPoint, kAlpha };
+    enum Dimension : std::uint32_t { kLight, kPoint, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
     HitLightingCounters counters;
     core::RayStream shadow_rays;
     shadow_rays.resize(direct_ ? rays.size() : 0);
     std::vector<std::uint32_t> target;
     std::vector<glm::vec3> arriving;
+    std::vector<LobeRay> lobes;
+    std::vector<std::uint32_t> lobe_target;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         radiance[i] = glm::vec3(0.0f);
         const core::Ray ray = rays.get(i);
@@ -167,6 +228,15 @@ HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::
         if (bounced_) radiance[i] += bounced_(surface, -ray.direction);
         if (!direct_) continue;
         const core::SampleSequence sequence(keys[i], frame);
+        if (mirrors_lights(surface)) {
+            const auto lobe = sample_lobe(lighting_.everything(), surface, surface.origin_above(),
+                                          -ray.direction, sequence.point(kLobe).x,
+                                          sequence.point(kLobeDirection), sequence.bits(kLobeAlpha));
+            if (lobe) {
+                lobes.push_back(*lobe);
+                lobe_target.push_back(static_cast<std::uint32_t>(i));
+            }
+        }
         const auto arrival =
             sample_light(lighting_, lighting_.everything(), surface, surface.origin_above(), -ray.direction,
                          sequence.point(kLight).x, sequence.point(kPoint), sequence.bits(kAlpha));
@@ -181,7 +251,10 @@ HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::
     for (std::size_t i = 0; i < target.size(); ++i) {
         if (!occluded[i]) radiance[target[i]] += arriving[i];
     }
-    counters.shadow_rays = target.size();
+    counters.shadow_rays = target.size() + lobes.size();
+    counters.exhausted +=
+        trace_lobes(scene_, tracer_, lighting_.everything(), lobes,
+                    [&](std::size_t i, const glm::vec3& light) { radiance[lobe_target[i]] += light; });
     return counters;
 }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <optional>
 #include <span>
@@ -65,6 +66,10 @@ private:
     bool gathers_anything_ = false;
 };
 
+/// Whether a smooth lobe needs a ray of its own: light sampling alone would leave speckles of lights that it
+/// mirrors. Such surfaces weigh both by the power heuristic.
+bool mirrors_lights(const core::SurfacePoint& surface);
+
 /// One sampled light on its way to a surface, before its shadow ray.
 struct LightArrival {
     core::Ray shadow_ray;
@@ -78,6 +83,25 @@ std::optional<LightArrival> sample_light(const SceneLighting& lighting, const co
                                          const core::SurfacePoint& surface, const glm::vec3& origin,
                                          const glm::vec3& outgoing, float u_light, const glm::vec2& u_point,
                                          std::uint32_t seed);
+
+/// A ray in a direction that the BRDF chose, and what its light counts.
+struct LobeRay {
+    core::Ray ray;
+    core::BrdfSample chosen;
+    core::LightReceiver receiver;
+    core::LightSampler::Selection selection;
+};
+
+/// Of a surface that mirrors_lights(). Nothing where the lobe sends no ray above the surface.
+std::optional<LobeRay> sample_lobe(const core::LightSampler& sampler, const core::SurfacePoint& surface,
+                                   const glm::vec3& origin, const glm::vec3& outgoing, float u_lobe,
+                                   const glm::vec2& u, std::uint32_t seed);
+
+/// Traces such rays and gives the radiance that each adds towards its `outgoing` by the light of `sampler`
+/// that it meets, weighted against sample_light(). @return rays that were exhausted
+std::uint64_t trace_lobes(const core::Scene& scene, const core::Tracer& tracer,
+                          const core::LightSampler& sampler, std::span<const LobeRay> lobes,
+                          const std::function<void(std::size_t lobe, const glm::vec3& light)>& add);
 
 /// Light that hits send back along their rays: emission of U, and direct light of S and U by a shadow ray
 /// each; misses bring the sky of U. Of the cached bounce nothing yet: `bounced`, where present, is called for

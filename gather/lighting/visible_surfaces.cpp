@@ -95,8 +95,8 @@ PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLigh
 PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting& lighting,
                           const VisibleSurfaces& visible, int samples, std::uint32_t frame,
                           std::vector<glm::vec3>& direct) {
-    enum Dimension : std::uint32_t { kLight, kPoint, kAlpha };
-    std::atomic<std::uint64_t> ray_count{0};
+    enum Dimension : std::uint32_t { kLight, kPoint, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
+    std::atomic<std::uint64_t> ray_count{0}, exhausted{0};
     core::parallel_for(
         static_cast<std::size_t>(visible.height), kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
             const core::ScopedFlushDenormals flush;
@@ -104,6 +104,8 @@ PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting&
             core::RayStream rays;
             std::vector<std::size_t> pixels;
             std::vector<glm::vec3> arriving;
+            std::vector<LobeRay> lobes;
+            std::vector<std::size_t> lobe_pixels;
             rays.resize((end - begin) * width * static_cast<std::size_t>(samples));
             for (std::size_t pixel = begin * width; pixel < end * width; ++pixel) {
                 if (!visible.surface(pixel)) continue;
@@ -112,6 +114,17 @@ PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting&
                 for (int sample = 0; sample < samples; ++sample) {
                     const core::SampleSequence sequence(key, frame * static_cast<std::uint32_t>(samples) +
                                                                  static_cast<std::uint32_t>(sample));
+                    const core::SurfacePoint& point = visible.points[pixel];
+                    if (mirrors_lights(point)) {
+                        const auto lobe =
+                            sample_lobe(lighting.sampled(), point, visible.origins[pixel],
+                                        visible.outgoing[pixel], sequence.point(kLobe).x,
+                                        sequence.point(kLobeDirection), sequence.bits(kLobeAlpha));
+                        if (lobe) {
+                            lobes.push_back(*lobe);
+                            lobe_pixels.push_back(pixel);
+                        }
+                    }
                     const auto arrival =
                         sample_light(lighting, lighting.sampled(), visible.points[pixel],
                                      visible.origins[pixel], visible.outgoing[pixel],
@@ -128,9 +141,13 @@ PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting&
             for (std::size_t i = 0; i < pixels.size(); ++i) {
                 if (!occluded[i]) direct[pixels[i]] += arriving[i];
             }
-            ray_count += pixels.size();
+            const float share = 1.0f / static_cast<float>(samples);
+            exhausted += trace_lobes(
+                inputs.scene, inputs.tracer, lighting.sampled(), lobes,
+                [&](std::size_t i, const glm::vec3& light) { direct[lobe_pixels[i]] += share * light; });
+            ray_count += pixels.size() + lobes.size();
         });
-    return {ray_count, 0};
+    return {ray_count, exhausted};
 }
 
 }  // namespace gather
