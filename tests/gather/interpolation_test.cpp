@@ -1,0 +1,149 @@
+// What a point of a surface reads from probes on other surfaces, farther along, or beside something near.
+#include "gather/screen_probes/interpolation.h"
+
+#include <gtest/gtest.h>
+
+#include "core/trace/triangle_tracer.h"
+#include "gather/lighting/scene_lighting.h"
+#include "gather/screen_probes/near_field.h"
+
+namespace {
+
+constexpr glm::vec3 kUp(0.0f, 1.0f, 0.0f);
+constexpr glm::vec3 kAside(1.0f, 0.0f, 0.0f);
+
+TEST(SurfaceWeight, ProbesRoundAConvexEdgeShareNothing) {
+    // The top of a box and its side, hardly apart, so that the plane distances do not tell.
+    EXPECT_EQ(gather::surface_weight({0, 0, 0}, kUp, 1.0f, {1e-4f, -1e-4f, 0}, kAside, 1e5f), 0.0f);
+    // A little bent it still counts, less than a flat one.
+    const glm::vec3 bent = glm::normalize(glm::vec3(0.5f, 1.0f, 0.0f));
+    const float weight = gather::surface_weight({0, 0, 0}, kUp, 1.0f, {1e-4f, 0, 0}, bent, 1e5f);
+    EXPECT_GT(weight, 0.5f);
+    EXPECT_LT(weight, 0.95f);
+    EXPECT_NEAR(gather::surface_weight({0, 0, 0}, kUp, 1.0f, {0.1f, 0, 0}, kUp, 1e5f), 1.0f, 1e-6f);
+}
+
+TEST(SurfaceWeight, AFloorSharesWithSlopesButNotWithTheWallBesideIt) {
+    // Concave: the wall's point lies above the floor, the floor's in front of the wall.
+    EXPECT_EQ(gather::surface_weight({1e-4f, 0, 0}, kUp, 1.0f, {0, 1e-4f, 0}, kAside, 1e5f), 0.0f);
+    const glm::vec3 slope = glm::normalize(glm::vec3(1.0f, 1.5f, 0.0f));
+    EXPECT_GT(gather::surface_weight({1e-4f, 0, 0}, kUp, 1.0f, {0, 1e-4f, 0}, slope, 1e5f), 0.9f);
+}
+
+TEST(SurfaceWeight, PlanesAreAskedFromBothSides) {
+    // The second point lies in the first one's plane, but not the first in the second's.
+    const glm::vec3 slope = glm::normalize(glm::vec3(0.3f, 1.0f, 0.0f));
+    EXPECT_LT(gather::surface_weight({0.1f, 0, 0}, kUp, 1.0f, {0, 0, 0}, slope, 1e5f), 1e-6f);
+}
+
+/// A plane of three by three tiles, all probes in a line of depths as on a floor seen at a grazing angle.
+gather::ProbeAtlas grazing_atlas() {
+    gather::ProbeAtlas atlas;
+    atlas.resolution = 4;
+    atlas.spacing = 16;
+    atlas.tiles_x = 3;
+    atlas.tiles_y = 3;
+    for (int y = 0; y < 3; ++y) {
+        for (int x = 0; x < 3; ++x) {
+            gather::Probe probe;
+            probe.pixel = {16 * x + 8, 16 * y + 8};
+            probe.position = {0.1f * static_cast<float>(x), 0.0f, -2.0f * static_cast<float>(y)};
+            probe.normal = kUp;
+            probe.depth = 2.0f;
+            atlas.probes.push_back(probe);
+        }
+    }
+    atlas.allocate_texels();
+    return atlas;
+}
+
+TEST(ProbeInterpolation, OnAGrazingSurfaceNearerProbesCountMore) {
+    const gather::ProbeAtlas atlas = grazing_atlas();
+    // Half-way on the screen between the rows; in the world much nearer to the first.
+    const gather::ProbeReader reader{{24.0f, 16.0f}, {0.1f, 0.0f, -0.1f}, kUp, 2.0f, 0.1f};
+    const gather::ProbeWeights weights = gather::find_probes(atlas, reader, 1e4f);
+    float first_row = 0.0f;
+    for (std::size_t i = 0; i < weights.count; ++i) {
+        if (weights.probe[i] < 3) first_row += weights.weight[i];
+    }
+    EXPECT_GT(first_row, 0.99f);
+    EXPECT_GT(weights.surface_support, weights.support);
+    // Without a spacing the world's distances are not asked.
+    gather::ProbeReader without = reader;
+    without.spacing = std::numeric_limits<float>::infinity();
+    const gather::ProbeWeights even = gather::find_probes(atlas, without, 1e4f);
+    EXPECT_FLOAT_EQ(even.surface_support, even.support);
+}
+
+TEST(NearField, ATexelThatEndsNearTakesWhatItsNeighboursSeeBeyond) {
+    gather::ProbeAtlas atlas = grazing_atlas();
+    for (std::size_t p = 0; p < atlas.probes.size(); ++p) {
+        atlas.probes[p].position = {0.1f * static_cast<float>(p % 3), 0.0f, 0.1f * static_cast<float>(p / 3)};
+    }
+    for (glm::vec3& value : atlas.radiance) value = glm::vec3(2.0f);
+    for (float& distance : atlas.hit_distance) distance = 10.0f;
+    for (std::uint8_t& count : atlas.ray_count) count = 1;
+    const std::size_t texels = atlas.texel_count();
+    atlas.radiance[4 * texels + 3] = glm::vec3(1000.0f);
+    atlas.hit_distance[4 * texels + 3] = 1e-3f;
+    // In texel 5 all are near: none knows better, and the centre keeps its own.
+    for (std::size_t p = 0; p < 9; ++p) atlas.hit_distance[p * texels + 5] = 1e-3f;
+    atlas.radiance[4 * texels + 5] = glm::vec3(7.0f);
+
+    core::Camera camera;
+    gather::VisibleSurfaces visible;
+    visible.footprint = gather::PixelFootprint(core::CameraRays(camera, 48, 48), 48, 48);
+    gather::take_out_near_field({}, visible, 16.0f, atlas);
+    EXPECT_EQ(atlas.radiance[4 * texels + 3], glm::vec3(2.0f));
+    EXPECT_EQ(atlas.hit_distance[4 * texels + 3], 10.0f);
+    EXPECT_EQ(atlas.radiance[4 * texels + 5], glm::vec3(7.0f));
+    EXPECT_EQ(atlas.radiance[3 * texels + 3], glm::vec3(2.0f));
+}
+
+/// A smooth metal under a constant sky that is sampled: light sampling and the lobe's own ray together bring
+/// what the lobe reflects of it, however narrow it is.
+TEST(HitLighting, LobeRaysAndLightSamplingAddUpOnASmoothMetal) {
+    core::Scene scene;
+    scene.sky = core::Sky::constant(glm::vec3(1.0f));
+    const core::TriangleTracer tracer(scene);
+    gather::LightingSettings settings;
+    settings.sampled_emitters = gather::SampledEmitters::kAll;
+    const gather::SceneLighting lighting(scene, tracer, settings);
+    core::SurfacePoint surface;
+    surface.geometric_normal = kUp;
+    surface.frame = core::ShadingFrame::from_normal(kUp);
+    for (const float roughness : {0.05f, 0.3f, 0.5f, 0.8f}) {
+        SCOPED_TRACE(roughness);
+        surface.roughness = roughness;
+        surface.brdf = core::Brdf{};
+        surface.brdf.diffuse = glm::vec3(0.0f);
+        surface.brdf.f0 = glm::vec3(1.0f);
+        surface.brdf.alpha = roughness * roughness;
+        EXPECT_EQ(gather::mirrors_lights(surface), roughness <= 0.5f);
+        const glm::vec3 outgoing = glm::normalize(glm::vec3(0.3f, 1.0f, 0.2f));
+        double sum = 0.0;
+        double albedo = 0.0;
+        constexpr std::uint32_t kCount = 1u << 14;
+        for (std::uint32_t i = 0; i < kCount; ++i) {
+            const core::SampleSequence sequence(7, i);
+            const auto light = gather::sample_light(lighting, lighting.sampled(), surface, glm::vec3(0.0f),
+                                                    outgoing, sequence.point(0).x, sequence.point(1), 0);
+            if (light) sum += static_cast<double>(light->specular.x);
+            const core::BrdfSample chosen =
+                core::sample_specular(surface.brdf, surface.frame.to_local(outgoing), sequence.point(4));
+            if (chosen.pdf > 0.0f) {
+                albedo += static_cast<double>(chosen.value.specular.x * chosen.incoming.z / chosen.pdf);
+            }
+            if (!gather::mirrors_lights(surface)) continue;
+            const auto lobe = gather::sample_lobe(lighting.sampled(), surface, glm::vec3(0.0f), outgoing,
+                                                  sequence.point(2).x, sequence.point(3), 0);
+            if (!lobe) continue;
+            gather::trace_lobes(
+                scene, tracer, lighting.sampled(), {&*lobe, 1},
+                [&](std::size_t, const glm::vec3& value) { sum += static_cast<double>(value.x); });
+        }
+        EXPECT_NEAR(sum / albedo, 1.0, 0.02);
+    }
+}
+
+}  // namespace
