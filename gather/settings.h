@@ -61,7 +61,7 @@ enum class NearField {
 struct IntegrateSettings {
     DiffuseIntegral diffuse = DiffuseIntegral::kSh;
     bool rough_specular = true;   ///< Reflects the probes in GGX directions; off: E / pi times the albedo.
-    int specular_directions = 4;  ///< A pixel a frame. 1 ... 64.
+    int specular_directions = 2;  ///< A pixel a frame. 1 ... 64.
     float rough_specular_max = 0.8f;   ///< Rougher surfaces reflect E / pi. 0 ... 1.
     bool bent_normal = true;           ///< Short rays at full resolution restore contact shadows.
     int bent_normal_rays = 4;          ///< A pixel a frame. 1 ... 64.

@@ -29,6 +29,14 @@ core::ShColor mix_sh(const ProbeAtlas& atlas, const ProbeWeights& weights) {
     return sum;
 }
 
+/// One of the probes by its weight: a direction reads one, and their mean over directions and frames is the
+/// interpolation. @param u in [0, 1). @pre weights.count > 0
+std::size_t choose_probe(const ProbeWeights& weights, float u) {
+    std::size_t i = 0;
+    for (; i + 1 < weights.count && u >= weights.weight[i]; ++i) u -= weights.weight[i];
+    return weights.probe[i];
+}
+
 /// Irradiance about a normal.
 glm::vec3 irradiance(const IntegrateInputs& in, const ProbeWeights& weights, const glm::vec3& normal,
                      std::vector<float>& cosine_weights) {
@@ -127,6 +135,7 @@ void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeight
             }
             const std::uint32_t key = pixel_key(in.seed, static_cast<int>(pixel % width),
                                                 static_cast<int>(pixel / width), kSpecularUse);
+            if (weights[pixel].count == 0) continue;
             glm::vec3 sum(0.0f);
             for (std::uint32_t k = 0; k < samples; ++k) {
                 const core::SampleSequence sequence(key, in.frame * samples + k);
@@ -134,11 +143,8 @@ void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeight
                     core::sample_specular(point.brdf, outgoing, sequence.point(0));
                 if (!(chosen.pdf > 0.0f)) continue;
                 const glm::vec3 direction = glm::normalize(point.frame.to_world(chosen.incoming));
-                const glm::vec2 at = core::octahedral_from_direction(direction);
-                glm::vec3 light(0.0f);
-                for (std::size_t i = 0; i < weights[pixel].count; ++i) {
-                    light += weights[pixel].weight[i] * in.atlas.read(weights[pixel].probe[i], at);
-                }
+                const glm::vec3 light = in.atlas.read(choose_probe(weights[pixel], sequence.point(1).x),
+                                                      core::octahedral_from_direction(direction));
                 sum += chosen.value.specular * (chosen.incoming.z / chosen.pdf) * light;
             }
             specular[pixel] += sum / static_cast<float>(samples);

@@ -13,6 +13,9 @@ constexpr float kLeastCorner = 1e-3f;
 /// Below this no probe lies in the point's plane.
 constexpr float kLeastSupport = 1e-6f;
 
+/// Halvings by the plane distance beyond which a weight is 0.
+constexpr float kGone = 40.0f;
+
 /// Normals whose cosine is less share nothing.
 constexpr float kLeastConvexCosine = 0.5f;
 constexpr float kLeastConcaveCosine = 0.0f;
@@ -52,34 +55,26 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
     const auto spacing = static_cast<float>(atlas.spacing);
     const glm::ivec2 tile(static_cast<int>(reader.pixel.x) / atlas.spacing,
                           static_cast<int>(reader.pixel.y) / atlas.spacing);
-    std::uint32_t nearest = 0;
-    float least_badness = std::numeric_limits<float>::infinity();
-    const auto consider = [&](std::uint32_t index, float least) {
+    const auto own = static_cast<std::size_t>(tile.y * atlas.tiles_x + tile.x);
+    const float to_relative = 1.0f / reader.depth;
+    const float to_spacings2 = 1.0f / (reader.spacing * reader.spacing);
+    atlas.for_probes_around(glm::ivec2(reader.pixel), [&](std::size_t index) {
         const Probe& probe = atlas.probes[index];
-        if (!probe.valid()) return;
+        if (!probe.valid() || result.count == ProbeWeights::kMost) return;
+        const float corner = std::max(index == own ? kLeastCorner : 0.0f,
+                                      tent(glm::vec2(probe.pixel) - reader.pixel, spacing));
+        if (!(corner > 0.0f)) return;
         const glm::vec3 offset = probe.position - reader.position;
-        const float distance = plane_distance(offset, reader.normal, probe.normal);
         const float facing = normal_weight(offset, reader.normal, probe.normal);
-        // One that faces elsewhere stands in only where there is no other.
-        const float badness = distance + (1.0f - facing) * reader.depth;
-        if (badness < least_badness) {
-            least_badness = badness;
-            nearest = index;
-        }
-        const float corner = std::max(least, tent(glm::vec2(probe.pixel) - reader.pixel, spacing));
-        if (!(corner > 0.0f) || result.count == ProbeWeights::kMost) return;
-        const float on_surface = corner * weight_at(distance / reader.depth, sharpness) * facing;
-        const float spacings2 = glm::dot(offset, offset) / (reader.spacing * reader.spacing);
+        const float distance = plane_distance(offset, reader.normal, probe.normal) * to_relative;
+        if (!(facing > 0.0f) || sharpness * distance * distance > kGone) return;
+        const float on_surface = corner * facing * weight_at(distance, sharpness);
+        const float spacings2 = glm::dot(offset, offset) * to_spacings2;
         const float weight = on_surface / (1.0f + spacings2 * spacings2);
-        if (!(weight > 0.0f)) return;
-        result.probe[result.count] = index;
+        result.probe[result.count] = static_cast<std::uint32_t>(index);
         result.weight[result.count++] = weight;
         result.support += weight;
         result.surface_support += on_surface;
-    };
-    const std::size_t own = static_cast<std::size_t>(tile.y * atlas.tiles_x + tile.x);
-    atlas.for_probes_around(glm::ivec2(reader.pixel), [&](std::size_t index) {
-        consider(static_cast<std::uint32_t>(index), index == own ? kLeastCorner : 0.0f);
     });
     if (result.support > kLeastSupport) {
         for (std::size_t i = 0; i < result.count; ++i) result.weight[i] /= result.support;
@@ -87,10 +82,20 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
     }
     result.confident = false;
     result.count = 0;
-    if (std::isinf(least_badness)) return result;
-    result.probe[0] = nearest;
-    result.weight[0] = 1.0f;
-    result.count = 1;
+    float least_badness = std::numeric_limits<float>::infinity();
+    atlas.for_probes_around(glm::ivec2(reader.pixel), [&](std::size_t index) {
+        const Probe& probe = atlas.probes[index];
+        if (!probe.valid()) return;
+        const glm::vec3 offset = probe.position - reader.position;
+        // One that faces elsewhere stands in only where there is no other.
+        const float badness = plane_distance(offset, reader.normal, probe.normal) +
+                              (1.0f - normal_weight(offset, reader.normal, probe.normal)) * reader.depth;
+        if (!(badness < least_badness)) return;
+        least_badness = badness;
+        result.probe[0] = static_cast<std::uint32_t>(index);
+        result.weight[0] = 1.0f;
+        result.count = 1;
+    });
     return result;
 }
 
