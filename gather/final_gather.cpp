@@ -82,8 +82,9 @@ public:
         ledger_.time("primary", [&] { return find_visible_surfaces(inputs_, lighting_, frame, visible_); });
         if (lighting_.samples_anything()) {
             ledger_.time("direct", [&] {
-                return add_direct_light(inputs_, lighting_, visible_, settings_.lighting.direct_samples,
-                                        frame, direct_);
+                return add_direct_light(inputs_, lighting_, visible_,
+                                        lighting_.direct_samples(settings_.lighting.direct_samples), frame,
+                                        direct_);
             });
         }
         if (plan_.on(Effect::kScreenProbes)) gather_light(frame);

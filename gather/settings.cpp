@@ -96,7 +96,7 @@ const std::vector<Knob>& knobs() {
         number("lighting.sky_peak_ratio", kL, &L::sky_peak_ratio, 0.0f, 1e6f,
                "sky beyond this multiple of its mean luminance is sampled"),
         number("lighting.direct_samples", kL, &L::direct_samples, 1, 64,
-               "lights that a pixel samples a frame"),
+               "lights that a pixel samples a frame; no more than there are if all are points and suns"),
         choice<P, int>("screen_probes.spacing", kP, &P::spacing,
                        {{"1", 1}, {"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}, {"32", 32}},
                        "pixels between uniform probes"),
@@ -181,6 +181,7 @@ Settings quality_settings(std::string_view quality) {
     if (quality == "draft") {
         settings.frames = 4;
         settings.lighting.direct_samples = 1;
+        settings.screen_probes.jitter_interpolation = true;  // Few frames show the grid otherwise.
         settings.screen_probes.adaptive_budget = 0.25f;
         settings.integrate.specular_directions = 1;
         settings.integrate.bent_normal_rays = 2;

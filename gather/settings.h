@@ -22,28 +22,28 @@ struct LightingSettings {
     float sampled_solid_angle = 2.0f;   ///< Steradians; emitters that look larger are not sampled. 0 ... 13.
     float sampled_power_share = 1e-6f;  ///< Of all light; emitters with less are not sampled. 0 ... 1.
     float sky_peak_ratio = 4.0f;  ///< Sky radiance beyond this multiple of its mean is sampled. 0 ... 1e6.
-    int direct_samples = 2;       ///< Lights that a pixel samples a frame. 1 ... 64.
+    int direct_samples = 4;       ///< Lights that a pixel samples a frame. 1 ... 64.
 };
 
 struct ScreenProbeSettings {
-    int spacing = 16;                  ///< Pixels between uniform probes; a power of two from 1 to 32.
-    int resolution = 8;                ///< Texels along an edge of a probe's octahedral map: 4, 8, 16 or 32.
-    bool jitter_placement = true;      ///< Moves the grid of probes from frame to frame.
-    bool jitter_directions = true;     ///< Moves the rays within their texels from frame to frame.
-    bool adaptive = true;              ///< Places further probes where interpolation fails.
-    float adaptive_budget = 0.5f;      ///< Most adaptive probes, as a share of the uniform ones. 0 ... 4.
-    float adaptive_threshold = 0.1f;   ///< Interpolation fails where the plane weights sum to less. 0 ... 1.
-    float plane_sharpness = 1e5f;      ///< k in exp2(-k (plane distance / depth)^2). 0 ... 1e8.
-    bool jitter_interpolation = true;  ///< Moves a pixel within its plane before it reads its probes.
-    bool importance_sampling = true;   ///< Moves rays from where the BRDF is under `cull_threshold`.
-    float cull_threshold = 0.1f;       ///< Of the BRDF, whose peak is about 1. 0 ... 1.
-    bool lighting_pdf = true;          ///< Guides rays by the light that the last frame found.
-    bool spatial_filter = true;        ///< Averages probes with their neighbours.
-    int filter_passes = 3;             ///< 1 ... 8.
-    float filter_angle = 10.0f;        ///< Degrees; a neighbour's ray that deviates by more is left out.
-    bool clamp_hit_distance = true;    ///< A neighbour's hit is no farther than one's own: keeps contacts.
-    float culled_weight = 0.1f;        ///< Own weight of texels without rays, in the filter. 0 ... 1.
-    float max_ray_intensity = 0.0f;    ///< cd/m^2 of luminance; clamps brighter rays; 0: no clamp.
+    int spacing = 16;                   ///< Pixels between uniform probes; a power of two from 1 to 32.
+    int resolution = 8;                 ///< Texels along an edge of a probe's octahedral map: 4, 8, 16 or 32.
+    bool jitter_placement = true;       ///< Moves the grid of probes from frame to frame.
+    bool jitter_directions = true;      ///< Moves the rays within their texels from frame to frame.
+    bool adaptive = true;               ///< Places further probes where interpolation fails.
+    float adaptive_budget = 0.5f;       ///< Most adaptive probes, as a share of the uniform ones. 0 ... 4.
+    float adaptive_threshold = 0.1f;    ///< Interpolation fails where the plane weights sum to less. 0 ... 1.
+    float plane_sharpness = 1e5f;       ///< k in exp2(-k (plane distance / depth)^2). 0 ... 1e8.
+    bool jitter_interpolation = false;  ///< Moves a pixel within its plane before it reads its probes.
+    bool importance_sampling = true;    ///< Moves rays from where the BRDF is under `cull_threshold`.
+    float cull_threshold = 0.1f;        ///< Of the BRDF, whose peak is about 1. 0 ... 1.
+    bool lighting_pdf = true;           ///< Guides rays by the light that the last frame found.
+    bool spatial_filter = true;         ///< Averages probes with their neighbours.
+    int filter_passes = 3;              ///< 1 ... 8.
+    float filter_angle = 10.0f;         ///< Degrees; a neighbour's ray that deviates by more is left out.
+    bool clamp_hit_distance = true;     ///< A neighbour's hit is no farther than one's own: keeps contacts.
+    float culled_weight = 0.1f;         ///< Own weight of texels without rays, in the filter. 0 ... 1.
+    float max_ray_intensity = 0.0f;     ///< cd/m^2 of luminance; clamps brighter rays; 0: no clamp.
 };
 
 /// How the probes' light becomes irradiance.

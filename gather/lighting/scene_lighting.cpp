@@ -114,6 +114,8 @@ SceneLighting::SceneLighting(const core::Scene& scene, const core::Tracer& trace
     trace_limit_ = static_cast<float>(std::min(4.0 * radius, 1e30));
     sampled_emitters_ = choose_emitters(scene, radius, settings);
     sampled_.emplace(scene, core::LightSubset{sky_.peaks.black() ? nullptr : &sky_.peaks, sampled_emitters_});
+    samples_extended_ = !sky_.peaks.black() || std::any_of(sampled_emitters_.begin(), sampled_emitters_.end(),
+                                                           [](std::uint8_t chosen) { return chosen != 0; });
     start_offsets_.resize(scene.instances.size());
     gathers_anything_ = !sky_.base.black();
     for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
@@ -123,6 +125,11 @@ SceneLighting::SceneLighting(const core::Scene& scene, const core::Tracer& trace
             gathers_anything_ = gathers_anything_ || scene.materials[material].emissive();
         }
     }
+}
+
+int SceneLighting::direct_samples(int wanted) const {
+    if (samples_extended_) return wanted;
+    return std::min(wanted, std::max(1, static_cast<int>(sampled_->group_count())));
 }
 
 std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::LightSampler& sampler,

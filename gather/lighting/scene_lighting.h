@@ -42,6 +42,10 @@ public:
     /// Whether shadow rays have anything to go to.
     bool samples_anything() const { return !sampled_->empty(); }
 
+    /// How many lights a pixel samples where `wanted` are asked for: no more than there are, if all of S are
+    /// points and suns, which leave hardly a penumbra to sample.
+    int direct_samples(int wanted) const;
+
     /// Whether gathering rays can bring light without any bounce.
     bool gathers_anything() const { return gathers_anything_; }
 
@@ -64,6 +68,7 @@ private:
     std::vector<float> start_offsets_;
     float trace_limit_ = 1.0f;
     bool gathers_anything_ = false;
+    bool samples_extended_ = false;  ///< Emitters or sky are in S.
 };
 
 /// Whether a smooth lobe needs a ray of its own: light sampling alone would leave speckles of lights that it
