@@ -54,7 +54,7 @@ PROOF = {
     "punctual_lights": ("assets/cornell_box.glb", LAMP_SCENE, 2, []),
     "sun": ("assets/cornell_box.glb", LIVING_ROOM_SCENE, 2, LIVING_ROOM),
     "sky": ("assets/cornell_box.glb", LIVING_ROOM_SCENE, 2, LIVING_ROOM),
-    "emissive_sampling": (LAMP_SCENE, "assets/cornell_box.glb", 2, []),
+    "emissive_sampling": ("assets/instances.glb", "assets/cornell_box.glb", 2, []),
     "alpha_mask": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
     "alpha_blend": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
     "screen_probes": (DARK_SCENE, "assets/cornell_box.glb", 2, []),
@@ -94,7 +94,8 @@ def budget(run, options):
         ratio, flip_ratio = path_error / max(error, 1e-9), its["flip"] / max(mine["flip"], 1e-9)
         records.append({"scene": view["name"], "diffuse": view["diffuse"], "seconds": seconds,
                         "path_seconds": other_stats["seconds"]["render"], "ratio": ratio, "flip_ratio": flip_ratio,
-                        "wall_seconds": wall, "wall_ratio": wall_ratio, "path_at_wall": at_wall, "gather": mine, "path": its})
+                        "wall_seconds": wall, "wall_ratio": wall_ratio, "path_at_wall": at_wall, "gather": mine,
+                        "path": its})
         rows.append([view["name"], f"{seconds:.2f}", f"{rays(stats, 'trace_probes'):.2f}",
                      f"{rays(stats, 'direct', 'probe_shadows'):.2f}",
                      f"{rays(stats, 'bent_normal', 'bent_normal_shadows'):.2f}",
