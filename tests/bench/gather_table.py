@@ -57,13 +57,13 @@ PROOF = {
     "emissive_sampling": ("assets/instances.glb", "assets/cornell_box.glb", 2, []),
     "alpha_mask": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
     "alpha_blend": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
-    "screen_probes": (DARK_SCENE, "assets/cornell_box.glb", 2, []),
+    "screen_probes": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
     "adaptive_probes": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
     "lighting_pdf": (DARK_SCENE, "assets/two_rooms.glb", 4, []),
     "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
     "rough_specular": ("assets/cornell_box.glb", "assets/glossy.glb", 8, []),
     "bent_normal": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
-    "temporal": ("assets/two_rooms.glb", "assets/two_rooms.glb", 4, []),
+    "temporal": ("assets/thin_walls.glb", "assets/thin_walls.glb", 8, []),
 }
 
 
