@@ -51,7 +51,7 @@ ALPHA_SCENE = "shared:scenes/alpha_blend_mode_test/AlphaBlendModeTest.glb"
 LAMP_SCENE = "shared:scenes/lights_punctual_lamp/LightsPunctualLamp.gltf"
 DARK_SCENE = "shared:scenes/suzanne/Suzanne.gltf"  # of proof: rendered with --sky=none
 PROOF = {
-    "punctual_lights": ("assets/cornell_box.glb", LAMP_SCENE, 2, []),
+    "punctual_lights": ("assets/cornell_box.glb", LAMP_SCENE, 16, ["--sky=0.1,0.1,0.1"]),
     "sun": ("assets/cornell_box.glb", LIVING_ROOM_SCENE, 2, LIVING_ROOM),
     "sky": ("assets/cornell_box.glb", LIVING_ROOM_SCENE, 2, LIVING_ROOM),
     "emissive_sampling": ("assets/instances.glb", "assets/cornell_box.glb", 2, []),
@@ -61,8 +61,8 @@ PROOF = {
     "adaptive_probes": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
     "lighting_pdf": (DARK_SCENE, "assets/two_rooms.glb", 4, []),
     "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
-    "rough_specular": ("assets/cornell_box.glb", "assets/glossy.glb", 8, []),
-    "bent_normal": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
+    "rough_specular": ("assets/cornell_box.glb", "shared:scenes/suzanne/Suzanne.gltf", 8, ["--sky=1,1,1"]),
+    "bent_normal": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
     "temporal": ("assets/thin_walls.glb", "assets/thin_walls.glb", 8, []),
 }
 
