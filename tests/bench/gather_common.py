@@ -15,7 +15,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 def add_options(parser):
     parser.add_argument("--fieldlight", default=str(ROOT / "build/release/fieldlight"))
     add_shared_option(parser)
-    parser.add_argument("--size", default="320x240")
+    parser.add_argument("--size", help="WxH; by default what the command says")
     parser.add_argument("--threads", default="0")
     parser.add_argument("--cache", default="/tmp/fieldlight_references", help="folder that keeps the references")
     parser.add_argument("--views", help="names of tests/images/views.json with commas between; all by default")

@@ -3,9 +3,10 @@
 
     tests/bench/gather_table.py budget|truth|ablation|effects|proof|speed [--views NAME,...] [--size WxH] [--readme] ...
 
-budget: equal time. truth: cranked up, then each approximation back on. ablation: each technique off
-alone. effects: auto against all on every scene. proof:
-where each effect is needed (--seeds 8, --size 160x120). speed: seconds by pass of a draft frame. Exit code 1 where a gate fails.
+budget: equal time, by the renderer's clock and by the wall's. truth: cranked up, then each approximation back on;
+small by default (96x72, 16 frames, 4 seeds, the diffuse views of assets/), so that it can be run. ablation: each
+technique off alone, at equal probe rays. effects: auto against all on every scene. proof: a scene that each effect
+is needed in (160x120, 8 seeds). speed: medians by pass of a draft frame. Exit code 1 where a gate fails.
 Errors are relMSE without the reference's noise (and in truth without the gather's), FLIP, energy bias in %.
 """
 
@@ -15,6 +16,7 @@ import pathlib
 import statistics
 import sys
 import tempfile
+import time
 
 from exr_reader import squared_bias
 from gather_common import (ROOT, Runner, add_options, corrected, geometric_mean, load_views, scene_of, setting, table,
@@ -29,6 +31,7 @@ LEDGER = {
     "filter": {"screen_probes__spatial_filter": "on"},
     "culling, with its filter": {"screen_probes__spatial_filter": "on", "screen_probes__importance_sampling": "on"},
     "bent normal": {"integrate__bent_normal": "on"},
+    "bent normal, multi-bounce": {"integrate__bent_normal": "on", "integrate__near_field": "multi_bounce"},
     "jittered interpolation": {"screen_probes__jitter_interpolation": "on"},
     "intensity clamp, 100 cd/m^2": {"screen_probes__max_ray_intensity": 100},
     "spacing 16": {"screen_probes__spacing": 16},
@@ -39,6 +42,29 @@ TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "
               "screen_probes__jitter_placement", "screen_probes__jitter_directions",
               "screen_probes__jitter_interpolation", "temporal__accumulate", "integrate__rough_specular"]
 PROBE_PASSES = ("place_probes", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
+
+
+# Of proof, by effect: a scene that auto drops it in, a scene that needs it, frames, and flags of camera and light.
+LIVING_ROOM = ["--eye=0,1.2,0", "--look-at=0,0.5,8", "--fov=75", "--sun=10,20,60", "--sky=3,4,6"]
+LIVING_ROOM_SCENE = "shared:scenes/living_room_godot/living_room.glb"
+ALPHA_SCENE = "shared:scenes/alpha_blend_mode_test/AlphaBlendModeTest.glb"
+LAMP_SCENE = "shared:scenes/lights_punctual_lamp/LightsPunctualLamp.gltf"
+DARK_SCENE = "shared:scenes/suzanne/Suzanne.gltf"  # of proof: rendered with --sky=none
+PROOF = {
+    "punctual_lights": ("assets/cornell_box.glb", LAMP_SCENE, 16, ["--sky=0.1,0.1,0.1"]),
+    "sun": ("assets/cornell_box.glb", LIVING_ROOM_SCENE, 2, LIVING_ROOM),
+    "sky": ("assets/cornell_box.glb", LIVING_ROOM_SCENE, 2, LIVING_ROOM),
+    "emissive_sampling": ("assets/instances.glb", "assets/cornell_box.glb", 2, []),
+    "alpha_mask": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
+    "alpha_blend": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
+    "screen_probes": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
+    "adaptive_probes": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
+    "lighting_pdf": (DARK_SCENE, "assets/two_rooms.glb", 4, []),
+    "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
+    "rough_specular": ("assets/cornell_box.glb", "shared:scenes/suzanne/Suzanne.gltf", 8, ["--sky=1,1,1"]),
+    "bent_normal": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
+    "temporal": ("assets/thin_walls.glb", "assets/thin_walls.glb", 8, []),
+}
 
 
 def passes(stats):
@@ -56,21 +82,26 @@ def budget(run, options):
     rows, records, failed = [], [], []
     for view in load_views(options):
         reference = run.reference(view)
+        start = time.monotonic()
         picture, stats = run.gather(view)
-        seconds = stats["seconds"]["render"]
+        wall, seconds = time.monotonic() - start, stats["seconds"]["render"]
         other, other_stats = run.path(view, "--spp", 1048576, "--time-budget", seconds)
+        wall_other, _ = run.path(view, "--spp", 1048576, "--time-budget", wall)
         mine, its = run.compare(picture, reference), run.compare(other, reference)
+        at_wall = run.compare(wall_other, reference)
+        wall_ratio = corrected(at_wall) / max(corrected(mine), 1e-9)
         error, path_error = corrected(mine), corrected(its)
         ratio, flip_ratio = path_error / max(error, 1e-9), its["flip"] / max(mine["flip"], 1e-9)
         records.append({"scene": view["name"], "diffuse": view["diffuse"], "seconds": seconds,
                         "path_seconds": other_stats["seconds"]["render"], "ratio": ratio, "flip_ratio": flip_ratio,
-                        "gather": mine, "path": its})
+                        "wall_seconds": wall, "wall_ratio": wall_ratio, "path_at_wall": at_wall, "gather": mine,
+                        "path": its})
         rows.append([view["name"], f"{seconds:.2f}", f"{rays(stats, 'trace_probes'):.2f}",
                      f"{rays(stats, 'direct', 'probe_shadows'):.2f}",
                      f"{rays(stats, 'bent_normal', 'bent_normal_shadows'):.2f}",
                      f"{error:.3g}, {mine['flip']:.3f}, {mine['energy_bias']:+.2f} %",
                      f"{path_error:.3g}, {its['flip']:.3f}, {its['energy_bias']:+.2f} %", f"{ratio:.2f}",
-                     f"{flip_ratio:.2f}"])
+                     f"{flip_ratio:.2f}", f"{wall:.2f}", f"{wall_ratio:.2f}"])
         if min(error, path_error) <= 0 or mine["rel_mse_corrected_details"]["low"] <= 0:
             failed.append(f"{view['name']}: the reference is too noisy to tell; raise --reference-spp")
         if view["diffuse"] and ratio < 4:
@@ -81,15 +112,19 @@ def budget(run, options):
     if mean < 10:
         failed.append(f"diffuse scenes: relMSE is lower by {mean:.2f}x in the geometric mean, not 10x")
     text = table(["scene", "seconds", "probe rays", "shadow rays", "bent-normal rays a pixel a frame",
-                  "gather: relMSE, FLIP, bias", "path: relMSE, FLIP, bias", "relMSE ratio", "FLIP ratio"], rows)
-    return text + f"\n\nGeometric mean over the diffuse scenes: {mean:.2f}", records, failed
+                  "gather: relMSE, FLIP, bias", "path: relMSE, FLIP, bias", "relMSE ratio", "FLIP ratio",
+                  "wall seconds", "relMSE ratio at these"], rows)
+    return text + f"\n\nAt {options.size}. Geometric mean over the diffuse scenes: {mean:.2f}", records, failed
 
 
 def truth(run, options):
+    """Every diffuse view of assets/ (or those of --views), on triangles and fields."""
     rows, records, failed = [], [], []
     for view in load_views(options):
+        if not options.views and not (view["diffuse"] and view["scene"].startswith("assets/")):
+            continue
         cases = [("triangle", "truth", {})] + ([("sdf", "truth", {})] if not options.no_sdf else [])
-        cases += [("triangle", name, change) for name, change in LEDGER.items()]
+        cases += [("triangle", name, change) for name, change in LEDGER.items() if not options.no_ledger]
         for tracer, name, change in cases:
             reference = run.reference(view, tracer)
             pictures = [run.gather(view, *setting(**{**TRUTH, **change}), tracer=tracer, seed=seed)[0]
@@ -104,18 +139,29 @@ def truth(run, options):
 
 
 def ablation(run, options):
+    """At equal probe rays: what traces fewer a frame than the whole gets frames in proportion."""
     rows, records = [], []
     for view in load_views(options):
         reference = run.reference(view)
         for name in ["nothing"] + TECHNIQUES:
-            picture, stats = run.gather(view, *([] if name == "nothing" else setting(**{name: "off"})))
+            flags, frames = ([] if name == "nothing" else setting(**{name: "off"})), options.frames
+            picture, stats = run.gather(view, *flags)
+            if name == "nothing":
+                whole = rays(stats, "trace_probes")
+            elif rays(stats, "trace_probes") > 0 and name != "temporal__accumulate":
+                frames = max(1, round(options.frames * whole / rays(stats, "trace_probes")))
+                if frames != options.frames:
+                    picture, stats = run.gather(view, *flags, frames=frames)
             errors, name = run.compare(picture, reference), name.replace("__", ".")
             milliseconds = 1000 * stats["seconds"]["render"] / stats["samples_per_pixel"]
             records.append({"scene": view["name"], "off": name, "ms": milliseconds, "errors": errors,
-                            "probe_rays": rays(stats, "trace_probes")})
+                            "frames": frames,
+                            "probe_rays_a_frame": rays(stats, "trace_probes")})
             rows.append([view["name"], name, f"{corrected(errors):.3g}", f"{errors['percentiles']['99']:.3g}",
-                         f"{errors['flip']:.4f}", f"{milliseconds:.1f}", f"{rays(stats, 'trace_probes'):.3f}"])
-    return table(["scene", "off", "relMSE", "P99", "FLIP", "ms a frame", "probe rays a pixel"], rows), records, []
+                         f"{errors['flip']:.4f}", f"{milliseconds:.1f}", frames,
+                         f"{rays(stats, 'trace_probes') * frames:.2f}"])
+    return table(["scene", "off", "relMSE", "P99", "FLIP", "ms a frame", "frames",
+                  "probe rays a pixel, all frames"], rows), records, []
 
 
 def effects(run, options):
@@ -151,40 +197,40 @@ def effects(run, options):
 
 
 def proof(run, options):
-    """For each effect, the first scene where auto drops it and the first that is 20 % worse without it."""
-    places = load_views(options)
-    places += [{"name": name, "scene": str(path), "camera": [], "light": []}
-               for name, path in (scene_files(options.shared) if not options.views else [])]
-    dropped, worse, best = {}, {}, {}
-    for view in places:
-        try:
-            _, stats = run.gather(view)
-            names = [name for name, entry in stats["effects"].items() if entry["on"]]
-            for name in set(stats["effects"]) - set(names):
-                dropped.setdefault(name, view["name"])
-            open_ = [name for name in names if name not in worse]
-            reference = run.reference(view) if open_ else None
+    """For each effect, whether auto drops it in one scene, and relMSE without it over relMSE with it in another.
 
-            def error(chosen):
-                return statistics.mean(run.compare(run.gather(view, "--effects", ",".join(chosen), seed=seed)[0],
-                                                   reference)["rel_mse"] for seed in range(1, options.seeds + 1))
-            whole = error(names) if open_ else 0
-            for name in open_:
-                gain = error([other for other in names if other != name]) / whole if len(names) > 1 else 0
-                best[name] = max(best.get(name, 0), gain)
-                if gain >= 1.2:
-                    worse[name] = (view["name"], gain)
-        except RuntimeError as fault:
-            print(f"skipped {view['name']}: {fault}", file=sys.stderr)
-        if stats["effects"].keys() == dropped.keys() == worse.keys():
-            break
-    rows, failed = [], []
-    for name in stats["effects"]:
-        scene, gain = worse.get(name, ("", best.get(name, 0)))
-        rows.append([name, dropped.get(name, ""), scene, f"{gain:.2f}"])
-        failed += [f"{name}: {text}" for text, wrong in (("auto drops it nowhere", name not in dropped),
-                   (f"no scene is 20 % worse without it; at most {gain:.2f}x", name not in worse)) if wrong]
-    return table(["effect", "dropped by auto in", "needed in", "relMSE without / with"], rows), rows, failed
+    The reference's own noise is in both errors, which only lowers the ratio.
+    """
+    rows, records, failed = [], [], []
+    for effect, (off_in, scene, frames, arguments) in PROOF.items():
+        if options.only and effect not in options.only.split(","):
+            continue
+        flags = ["--sky=none"] if off_in == DARK_SCENE else []
+        flags += ["--accumulate", 1 if effect == "temporal" else frames, "--tracer", "triangle"]
+        _, stats = run.render(scene_of({"scene": off_in}, options.shared), flags, size="32x24")
+        dropped = not stats["effects"][effect]["on"]
+        view = {"name": f"proof.{pathlib.Path(scene).stem}", "scene": scene, "camera": arguments, "light": []}
+        _, stats = run.gather(view, frames=frames)
+        names = [name for name, entry in stats["effects"].items() if entry["on"]]
+        if effect not in names:
+            failed.append(f"{effect}: auto drops it in {scene}, too")
+            continue
+        reference = run.reference(view)
+        errors = [[run.compare(run.gather(view, "--effects", ",".join(chosen), seed=seed, frames=frames)[0],
+                               reference)["rel_mse"] for seed in range(1, options.seeds + 1)]
+                  for chosen in (names, [name for name in names if name != effect])]
+        whole, without = (statistics.mean(values) for values in errors)
+        gain = without / whole
+        records.append({"effect": effect, "dropped_in": off_in, "dropped": dropped, "scene": scene, "frames": frames,
+                        "arguments": arguments, "with": errors[0], "without": errors[1], "ratio": gain})
+        shown = f"{pathlib.Path(off_in).stem} {' '.join(map(str, flags[:-2]))}"
+        rows.append([effect, shown if dropped else "**no**",
+                     f"{pathlib.Path(scene).stem} {' '.join(arguments)}".strip(), frames, f"{whole:.3g}",
+                     f"{without:.3g}", f"{gain:.2f}"])
+        failed += [f"{effect}: {text}" for text, wrong in ((f"auto keeps it in {off_in}", not dropped),
+                   (f"{scene} is {gain:.2f}x as wrong without it, not 1.2x", not gain >= 1.2)) if wrong]
+    return table(["effect", "dropped by auto in", "needed in", "frames", "relMSE with", "without", "ratio"],
+                 rows), records, failed
 
 
 def pictures_equal(one, other):
@@ -197,7 +243,7 @@ def speed(run, options):
     rows, records, failed = [], [], []
     for view in load_views(options):
         cases = {"whole": (1, options.threads), "direct": (0, options.threads), "one": (1, 1), "two": (1, 2)}
-        seconds, last = {name: [] for name in cases}, {}
+        seconds, last, by_round = {name: [] for name in cases}, {}, []
         for round_ in range(options.rounds + 1):  # the first warms up
             for name, (bounces, threads) in cases.items():
                 _, stats = run.render(scene_of(view, options.shared), view["camera"] + view["light"] + [
@@ -206,30 +252,41 @@ def speed(run, options):
                 last[name] = stats
                 if round_:
                     seconds[name].append(stats["seconds"]["render"])
+            if round_:
+                by_round.append({name: entry["seconds"] for name, entry in passes(last["whole"]).items()})
         median = {name: statistics.median(values) for name, values in seconds.items()}
-        found = {name: entry["seconds"] for name, entry in passes(last["whole"]).items()}
-        share = sum(found.get(name, 0) for name in PROBE_PASSES if not name.startswith("bent")) / sum(found.values())
+        found = {name: statistics.median(entry[name] for entry in by_round) for name in by_round[0]}
+        share = sum(found.get(name, 0) for name in PROBE_PASSES) / sum(found.values())
+        unbent = sum(found.get(name, 0) for name in PROBE_PASSES if not name.startswith("bent")) / sum(found.values())
         ratio, scaling = median["whole"] / median["direct"], median["one"] / median["two"]
-        records.append({"scene": view["name"], "median": median, "passes": found, "share": share})
+        records.append({"scene": view["name"], "median": median, "passes": found, "share": share,
+                        "share_without_bent_normal": unbent})
         by_pass = ", ".join(f"{name} {1000 * value / options.frames:.1f}" for name, value in found.items())
-        rows.append([view["name"], f"{1000 * median['whole'] / options.frames:.1f}", f"{ratio:.2f}", f"{share:.2f}",
+        rows.append([view["name"], f"{1000 * median['whole'] / options.frames:.1f}", f"{ratio:.2f}",
+                     f"{share:.2f}", f"{unbent:.2f}",
                      f"{scaling:.2f}", f"{last['whole']['memory']['probe_bytes'] / 2**20:.2f}", by_pass])
         failed += [f"{view['name']}: {text}" for text, wrong in
                    ((f"{ratio:.2f}x direct light, not 4x", ratio > 4), (f"probe passes take {share:.2f}", share > 0.5),
                     (f"two threads give {scaling:.2f}x", scaling < 1.8)) if wrong]
-    return table(["scene", "ms a frame", "of direct light", "probe passes but tracing", "one to two threads",
-                  "cache MiB", "ms by pass"], rows), records, failed
+    return table(["scene", "ms a frame", "of direct light", "probe passes but tracing", "and but bent normals",
+                  "one to two threads", "cache MiB", "ms by pass"], rows), records, failed
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = {"budget": budget, "truth": truth, "ablation": ablation, "effects": effects, "proof": proof, "speed": speed}
+    commands = {"budget": budget, "truth": truth, "ablation": ablation, "effects": effects, "proof": proof,
+                "speed": speed}
     parser.add_argument("what", choices=commands)
     add_options(parser)
-    parser.add_argument("--seeds", type=int, default=4, help="of truth: pictures of the gather, at least 2")
+    parser.add_argument("--seeds", type=int, help="4 of truth (at least 2), 8 of proof")
+    parser.add_argument("--no-ledger", action="store_true", help="of truth: its gate alone")
     parser.add_argument("--no-sdf", action="store_true", help="of truth: triangles alone")
+    parser.add_argument("--only", help="of proof: effects with commas between")
     parser.add_argument("--rounds", type=int, default=5, help="of speed")
     options = parser.parse_args()
+    options.size = options.size or {"truth": "96x72", "effects": "64x48", "proof": "160x120",
+                                    "speed": "1280x720"}.get(options.what, "640x360")
+    options.seeds = options.seeds or (8 if options.what == "proof" else 4)
     if options.what == "truth" and options.seeds < 2:
         parser.error("--seeds is at least 2")
     with tempfile.TemporaryDirectory() as folder:

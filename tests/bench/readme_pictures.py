@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Renders the README's pictures, each through distance fields and through triangles, into assets/pictures.
 
-    tests/bench/readme_pictures.py [--fieldlight build/release/fieldlight] [--shared DIR] [--only NAME] [--gather] [--markdown]
+    tests/bench/readme_pictures.py [--fieldlight build/release/fieldlight] [--shared DIR] [--only NAME]
+        [--gather] [--markdown]
 
 --markdown prints the README's table of pictures with their commands and renders nothing.
 """
@@ -16,6 +17,8 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 COMMON = ["--size", "320x240", "--renderer", "path", "--spp", "64"]
+
+GATHER_VIEWS = ("cornell_box", "two_rooms", "living_room_godot")
 
 # name, scene ({shared} is $FIELDLIGHT_SHARED), further flags
 PICTURES = [
@@ -37,23 +40,32 @@ def command(program, entry, kind, output, shared):
 
 
 def render_gather(options, target, folder):
-    """gather | path at equal time | reference, of the views of the gather's proofs."""
-    for view in json.loads((ROOT / "tests/images/views.json").read_text())["views"]:
-        if options.only and options.only != view["name"]:
+    """gather | path at equal time | reference, of GATHER_VIEWS."""
+    views = json.loads((ROOT / "tests/images/views.json").read_text())["views"]
+    for view in views:
+        if view["name"] not in GATHER_VIEWS or options.only not in (None, view["name"]):
             continue
         scene = view["scene"].replace("shared:", options.shared + "/")
         seconds = None
         for kind in ("gather", "path", "reference"):
+            cached = pathlib.Path(options.cache) / f"picture.{view['name']}.{options.size}.{options.spp}.png"
+            picture = target / f"{view['name']}.{kind}.png"
+            if kind == "reference" and cached.exists():
+                picture.write_bytes(cached.read_bytes())
+                continue
             output = pathlib.Path(folder) / f"{view['name']}.{kind}.exr"
             flags = {"gather": ["--renderer", "gather", "--accumulate", "16"],
                      "path": ["--renderer", "path", "--spp", "1048576", "--time-budget", str(seconds)],
-                     "reference": ["--renderer", "path", "--spp", "4096", "--seed", "987654"]}[kind]
+                     "reference": ["--renderer", "path", "--spp", str(options.spp), "--seed", "987654"]}[kind]
             stats = output.with_suffix(".json")
-            subprocess.run([options.fieldlight, "render", scene, "-o", str(output), "--png", "--size", "320x240",
-                            "--tracer", "triangle", "--bounces", "1", "--stats", str(stats)] + view["camera"] +
-                           view["light"] + flags, check=True, cwd=ROOT)
+            subprocess.run([options.fieldlight, "render", scene, "-o", str(output), "--png", "--size", options.size,
+                            "--tracer", "triangle", "--bounces", "1", "--quiet", "--stats", str(stats)] +
+                           view["camera"] + view["light"] + flags, check=True, cwd=ROOT)
             seconds = seconds or json.loads(stats.read_text())["seconds"]["render"]
-            (target / f"{view['name']}.{kind}.png").write_bytes(output.with_suffix(".png").read_bytes())
+            picture.write_bytes(output.with_suffix(".png").read_bytes())
+            if kind == "reference":
+                cached.parent.mkdir(parents=True, exist_ok=True)
+                cached.write_bytes(picture.read_bytes())
 
 
 def markdown():
@@ -76,12 +88,16 @@ def main():
     parser.add_argument("--shared", default=os.environ.get("FIELDLIGHT_SHARED", str(ROOT.parent / "shared")))
     parser.add_argument("--only")
     parser.add_argument("--gather", action="store_true", help="the pictures of the gather's proofs instead")
+    parser.add_argument("--size", default="400x300", help="of --gather")
+    parser.add_argument("--spp", type=int, default=4096, help="of the references of --gather")
+    parser.add_argument("--cache", default="/tmp/fieldlight_references", help="keeps the references of --gather")
+    parser.add_argument("--target", default=str(ROOT / "assets/pictures"), help="folder of the pictures")
     parser.add_argument("--markdown", action="store_true")
     options = parser.parse_args()
     if options.markdown:
         markdown()
         return 0
-    target = ROOT / "assets" / "pictures"
+    target = pathlib.Path(options.target)
     target.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         if options.gather:
