@@ -21,6 +21,8 @@ struct ShortRays {
     core::RayStream rays;
     std::vector<std::size_t> pixels;
     std::vector<std::uint32_t> keys;
+    std::vector<std::uint8_t>
+        alone;  ///< Of a pixel without probes: the ray goes on as far as there is anything.
     core::HitStream hits;
     std::vector<std::uint8_t> occluded;
 };
@@ -44,7 +46,7 @@ public:
           frame_(frame),
           rays_a_pixel_(static_cast<std::uint32_t>(settings.bent_normal_rays)) {}
 
-    void trace(std::size_t first, std::size_t last, bool closest, ShortRays& out) const;
+    void trace(std::size_t first, std::size_t last, const NearLighting* near, ShortRays& out) const;
     void bend(const ShortRays& in, std::vector<BentNormal>& result) const;
     void shade(const NearLighting& near, const ShortRays& in, std::vector<glm::vec3>& near_irradiance,
                HitLightingCounters& counters) const;
@@ -58,14 +60,18 @@ private:
 };
 
 /// Of the pixels from `first` up to `last`.
-void BentNormalPass::trace(std::size_t first, std::size_t last, bool closest, ShortRays& out) const {
+void BentNormalPass::trace(std::size_t first, std::size_t last, const NearLighting* near,
+                           ShortRays& out) const {
     const auto width = static_cast<std::size_t>(visible_.width);
     out.rays.resize((last - first) * rays_a_pixel_);
     out.pixels.clear();
     out.keys.clear();
+    out.alone.clear();
+    std::vector<float> lengths;
     for (std::size_t pixel = first; pixel < last; ++pixel) {
         if (!visible_.surface(pixel)) continue;
         const core::SurfacePoint& point = visible_.points[pixel];
+        const bool alone = near && !near->weights[pixel].confident;
         const float length = settings_.bent_normal_pixels * visible_.footprint.at(visible_.depth[pixel]);
         const std::uint32_t key = pixel_key(inputs_.seed, static_cast<int>(pixel % width),
                                             static_cast<int>(pixel / width), kBentNormalUse);
@@ -77,23 +83,25 @@ void BentNormalPass::trace(std::size_t first, std::size_t last, bool closest, Sh
                 point.frame.to_world(core::sample_cosine_hemisphere(sequence.point(kDirection))));
             // Under the surface itself: no ray, open; what the shading normal leans over is not near.
             if (!(glm::dot(ray.direction, point.geometric_normal) > 0.0f)) continue;
-            ray.t_max = length;
+            if (!alone) ray.t_max = length;
             ray.seed = sequence.bits(kAlpha);
             out.rays.set(out.pixels.size(), ray);
             out.pixels.push_back(pixel);
             out.keys.push_back(core::hash_words(key, k));
+            out.alone.push_back(alone ? 1 : 0);
+            lengths.push_back(length);
         }
     }
     out.rays.resize(out.pixels.size());
     out.occluded.assign(out.pixels.size(), 0);
     if (out.pixels.empty()) return;
-    if (!closest) {
+    if (!near) {
         inputs_.tracer.trace_occluded(out.rays, out.occluded);
         return;
     }
     inputs_.tracer.trace_closest(out.rays, out.hits);
     for (std::size_t i = 0; i < out.pixels.size(); ++i) {
-        out.occluded[i] = out.hits.status[i] == core::HitStatus::kHit ? 1 : 0;
+        out.occluded[i] = out.hits.status[i] == core::HitStatus::kHit && out.hits.t[i] <= lengths[i] ? 1 : 0;
     }
 }
 
@@ -122,13 +130,14 @@ void BentNormalPass::bend(const ShortRays& in, std::vector<BentNormal>& result) 
 void BentNormalPass::shade(const NearLighting& near, const ShortRays& in,
                            std::vector<glm::vec3>& near_irradiance, HitLightingCounters& counters) const {
     NearHits found;
-    const auto count = static_cast<std::size_t>(std::count(in.occluded.begin(), in.occluded.end(), 1));
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < in.pixels.size(); ++i) count += in.occluded[i] || in.alone[i] ? 1 : 0;
     if (count == 0) return;
     found.rays.resize(count);
     found.hits.resize(count);
     found.radiance.resize(count);
     for (std::size_t i = 0; i < in.pixels.size(); ++i) {
-        if (!in.occluded[i]) continue;
+        if (!in.occluded[i] && !in.alone[i]) continue;
         found.rays.set(found.pixels.size(), in.rays.get(i));
         found.hits.set(found.pixels.size(), in.hits.get(i));
         found.keys.push_back(in.keys[i]);
@@ -138,10 +147,9 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in,
     const float share = core::kPi / static_cast<float>(rays_a_pixel_);
     for (std::size_t i = 0; i < count; ++i) {
         const ProbeWeights& weights = near.weights[found.pixels[i]];
-        if (weights.count == 0) continue;
         const glm::vec2 at = core::octahedral_from_direction(found.rays.get(i).direction);
         glm::vec3 held(0.0f);
-        for (std::size_t k = 0; k < weights.count; ++k) {
+        for (std::size_t k = 0; weights.confident && k < weights.count; ++k) {
             held += weights.weight[k] * near.atlas.read(weights.probe[k], at);
         }
         near_irradiance[found.pixels[i]] += share * (found.radiance[i] - held);
@@ -166,7 +174,7 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
         const core::ScopedFlushDenormals flush;
         const auto width = static_cast<std::size_t>(visible.width);
         ShortRays found;
-        pass.trace(begin * width, end * width, near != nullptr, found);
+        pass.trace(begin * width, end * width, near, found);
         pass.bend(found, result);
         HitLightingCounters counters;
         if (near) pass.shade(*near, found, near_irradiance, counters);

@@ -4,7 +4,8 @@
 // probes' light is the far field. Of the near field there are two accounts:
 // - traced: where a short ray hits, the hit's own light takes the place of what the probes hold in its
 //   direction. It is a control variate: its mean is right whatever the probes say of near things, and it has
-//   no noise where nothing is near.
+//   no noise where nothing is near. Where no probe lies on a pixel's surface, its rays are not short, and all
+//   that they find is its light: features too thin or too many for probes do not leak.
 // - multi_bounce: the probes through a cone about the opening, and what nearby surfaces send back estimated
 //   (Jimenez, Wu, Pesce and Jarabo, "Practical Realtime Strategies for Accurate Indirect Occlusion", 2016),
 //   after Mayaux, "Horizon-Based Indirect Lighting", 2018. No shadow rays, and no noise but of the opening.
@@ -41,8 +42,8 @@ struct BentNormalRays {
     std::uint64_t exhausted = 0;
 };
 
-/// Traces `integrate.bent_normal_rays` short rays a pixel. Their length is what `bent_normal_pixels` span on
-/// the screen at the pixel's distance.
+/// Traces `integrate.bent_normal_rays` short rays a pixel, whole ones with `near` where a pixel has no probe.
+/// Their length is what `bent_normal_pixels` span on the screen at the pixel's distance.
 /// @param near nullptr: hits are not shaded
 /// @param near_irradiance what to add to each pixel's irradiance, of either sign; left empty without `near`
 BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,

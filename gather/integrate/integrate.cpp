@@ -101,7 +101,9 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
             const glm::vec3& normal = point.frame.normal;
             const glm::vec3 albedo = diffuse_albedo(point.brdf, glm::dot(normal, visible.outgoing[pixel]));
             if (albedo == glm::vec3(0.0f)) continue;
-            glm::vec3 arriving = irradiance(in, weights[pixel], normal, cosine_weights);
+            const bool alone = !near_irradiance.empty() && !weights[pixel].confident;
+            glm::vec3 arriving =
+                alone ? glm::vec3(0.0f) : irradiance(in, weights[pixel], normal, cosine_weights);
             if (!bent.empty() && bent[pixel].visibility < 1.0f) {
                 const float v = bent[pixel].visibility;
                 const float near = multi_bounce(

@@ -27,7 +27,8 @@ struct IntegrateInputs {
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights);
 
 /// Light that the diffuse lobe sends to the eye, added to `diffuse`. @param bent what the probes are
-/// seen through; empty: everything is open. @param near_irradiance added to the probes'; may be empty
+/// seen through; empty: everything is open. @param near_irradiance may be empty;
+/// added to the probes', and alone where no probe lies on the surface
 void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
                        const std::vector<BentNormal>& bent, const std::vector<glm::vec3>& near_irradiance,
                        std::vector<glm::vec3>& diffuse);

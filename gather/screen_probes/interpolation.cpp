@@ -10,8 +10,8 @@ namespace {
 /// Keeps probes that were moved within their tile, off the regular grid, from falling out altogether.
 constexpr float kLeastCorner = 1e-3f;
 
-/// Below this no probe lies in the point's plane.
-constexpr float kLeastSupport = 1e-6f;
+/// Below this no probe lies on the point's surface.
+constexpr float kLeastSupport = 1e-3f;
 
 /// Halvings by the plane distance beyond which a weight is 0.
 constexpr float kGone = 40.0f;
@@ -76,7 +76,7 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
         result.support += weight;
         result.surface_support += on_surface;
     });
-    if (result.support > kLeastSupport) {
+    if (result.surface_support >= kLeastSupport) {
         for (std::size_t i = 0; i < result.count; ++i) result.weight[i] /= result.support;
         return result;
     }

@@ -122,6 +122,38 @@ TEST(FinalGather, ConvexBodyInAConstantSkyIsAFurnace) {
     EXPECT_LE(sum / count / 0.5, 1.01);
 }
 
+/// The front rim of the Cornell box faces the dark: nothing lights it. Without adaptive probes hardly any
+/// stands on it, and those of the lit walls within, which do, must not stand in.
+TEST(FinalGather, SurfacesWithoutAProbeTraceTheirOwnRays) {
+    const core::Scene scene = asset("cornell_box.glb");
+    gather::Settings settings;
+    settings.frames = 4;
+    settings.screen_probes.adaptive = false;
+    const auto rim_light = [&] {
+        const core::Frame frame = render(scene, settings, "auto", 160, 120);
+        const std::vector<float>& light = *frame.image.find("IndirectDiffuse.G");
+        const std::vector<float>& depth = *frame.image.find("Depth.Z");
+        const std::vector<float>& alpha = *frame.image.find("A");
+        float least = std::numeric_limits<float>::infinity();
+        for (std::size_t i = 0; i < depth.size(); ++i) {
+            if (alpha[i] == 1.0f) least = std::min(least, depth[i]);
+        }
+        double sum = 0.0;
+        int count = 0;
+        for (std::size_t i = 0; i < depth.size(); ++i) {
+            if (alpha[i] < 1.0f || depth[i] > 1.001f * least) continue;
+            sum += static_cast<double>(light[i]);
+            ++count;
+        }
+        EXPECT_GT(count, 100);
+        return sum / count;
+    };
+    // Not 0: the same depth takes in the first pixels of the lit walls.
+    const double traced = rim_light();
+    settings.integrate.near_field = gather::NearField::kMultiBounce;
+    EXPECT_LT(traced, 0.05 * rim_light());  // There the nearest probe does stand in.
+}
+
 TEST(FinalGather, RefusesLayersItDoesNotKnow) {
     const core::Scene scene = asset("cornell_box.glb");
     const core::TriangleTracer tracer(scene);
