@@ -66,9 +66,10 @@ public:
         : inputs_(inputs),
           settings_(settings),
           plan_(plan),
-          lighting_(inputs.scene, inputs.tracer, lighting_settings(settings, plan)),
+          lighting_(inputs.scene, inputs.tracer, planned_lighting(settings, plan)),
           hit_lighting_(inputs.scene, inputs.tracer, lighting_,
-                        settings.bounces > 0 && !lighting_.everything().empty()),
+                        settings.bounces > 0 && !lighting_.everything().empty(),
+                        settings.lighting.hit_roughness_min),
           table_(settings.screen_probes.resolution),
           accumulation_(inputs.width, inputs.height, inputs.aovs),
           ledger_(inputs.stop_requested) {}
@@ -97,18 +98,6 @@ public:
     core::Frame finish(int frame_count);
 
 private:
-    static LightingSettings lighting_settings(const Settings& settings, const Plan& plan) {
-        LightingSettings result = settings.lighting;
-        if (plan.on(Effect::kEmissiveSampling)) return result;
-        // No emitter has this share. What is sampled of the sky is not this effect's: `all` of it stays all.
-        result.sampled_power_share = std::numeric_limits<float>::infinity();
-        if (result.sampled_emitters == SampledEmitters::kAll) {
-            result.sampled_emitters = SampledEmitters::kAuto;
-            result.sky_peak_ratio = 0.0f;
-        }
-        return result;
-    }
-
     void gather_light(std::uint32_t frame);
     void accumulate();
     void add_probe_layers(core::Image& image) const;

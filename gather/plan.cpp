@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <variant>
 #include <vector>
 
 #include "core/scene/brdf.h"
 #include "core/support/error.h"
 #include "core/trace/surface.h"
+#include "gather/lighting/scene_lighting.h"
 
 namespace gather {
 
@@ -80,9 +82,10 @@ std::string counted(int count, const char* what) {
 /// A plan under way.
 class Planner {
 public:
-    Planner(const SceneFacts& facts, int width, int height, const Settings& settings,
-            const EffectRequest& request, const std::set<std::string>& layers)
-        : facts_(facts),
+    Planner(const core::Scene& scene, const SceneFacts& facts, int width, int height,
+            const Settings& settings, const EffectRequest& request, const std::set<std::string>& layers)
+        : scene_(scene),
+          facts_(facts),
           width_(width),
           height_(height),
           settings_(settings),
@@ -100,6 +103,7 @@ private:
     /// A layer asked for that shows the probes or what is traced beside them; empty if there is none.
     std::string probe_layer() const;
 
+    const core::Scene& scene_;
     const SceneFacts& facts_;
     const int width_;
     const int height_;
@@ -168,8 +172,9 @@ Plan Planner::make() {
 
     const bool light =
         facts_.punctual_lights > 0 || facts_.suns > 0 || facts_.sky || facts_.emissive_instances > 0;
-    const bool found_by_hits = facts_.sky || facts_.emissive_instances > 0;
-    const bool gathers = facts_.reflecting_parts > 0 && light && (settings_.bounces > 0 || found_by_hits);
+    const bool gathers =
+        facts_.reflecting_parts > 0 && light &&
+        (settings_.bounces > 0 || gathers_anything(scene_, planned_lighting(settings_, plan_)));
     const std::size_t tiles = static_cast<std::size_t>((width_ + probes.spacing - 1) / probes.spacing) *
                               static_cast<std::size_t>((height_ + probes.spacing - 1) / probes.spacing);
     const std::string shown = probe_layer();
@@ -261,7 +266,19 @@ EffectRequest parse_effects(std::string_view text) {
 Plan make_plan(const core::Scene& scene, int width, int height, const Settings& settings,
                const EffectRequest& request, const std::set<std::string>& layers) {
     const SceneFacts facts = find_facts(scene, settings);
-    return Planner(facts, width, height, settings, request, layers).make();
+    return Planner(scene, facts, width, height, settings, request, layers).make();
+}
+
+LightingSettings planned_lighting(const Settings& settings, const Plan& plan) {
+    LightingSettings result = settings.lighting;
+    if (plan.on(Effect::kEmissiveSampling)) return result;
+    // No emitter has this share. What is sampled of the sky is not this effect's: `all` of it stays all.
+    result.sampled_power_share = std::numeric_limits<float>::infinity();
+    if (result.sampled_emitters == SampledEmitters::kAll) {
+        result.sampled_emitters = SampledEmitters::kAuto;
+        result.sky_peak_ratio = 0.0f;
+    }
+    return result;
 }
 
 void apply_plan(const Plan& plan, core::Scene& scene) {

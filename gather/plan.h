@@ -62,6 +62,9 @@ struct Plan {
 Plan make_plan(const core::Scene& scene, int width, int height, const Settings& settings,
                const EffectRequest& request, const std::set<std::string>& layers = {});
 
+/// How the light is split under a plan: without emissive_sampling no emitter is sampled.
+LightingSettings planned_lighting(const Settings& settings, const Plan& plan);
+
 /// Takes out of the scene what the plan leaves out though the scene has it (an effect that a list does not
 /// name): lights, sky, alpha. Under `auto` and `all` it changes nothing. Call it before building tracers.
 void apply_plan(const Plan& plan, core::Scene& scene);

@@ -95,6 +95,8 @@ const std::vector<Knob>& knobs() {
                "of the emitters' power; those with less are not sampled"),
         number("lighting.sky_peak_ratio", kL, &L::sky_peak_ratio, 0.0f, 1e6f,
                "sky beyond this multiple of its mean luminance is sampled"),
+        number("lighting.hit_roughness_min", kL, &L::hit_roughness_min, 0.0f, 1.0f,
+               "what gathering rays hit is lit as if no smoother: no fireflies, and blurred caustics"),
         number("lighting.direct_samples", kL, &L::direct_samples, 1, 64,
                "lights that a pixel samples a frame; no more than there are if all are points and suns"),
         choice<P, int>("screen_probes.spacing", kP, &P::spacing,

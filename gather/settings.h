@@ -22,7 +22,9 @@ struct LightingSettings {
     float sampled_solid_angle = 2.0f;   ///< Steradians; emitters that look larger are not sampled. 0 ... 13.
     float sampled_power_share = 1e-6f;  ///< Of all light; emitters with less are not sampled. 0 ... 1.
     float sky_peak_ratio = 4.0f;  ///< Sky radiance beyond this multiple of its mean is sampled. 0 ... 1e6.
-    int direct_samples = 4;       ///< Lights that a pixel samples a frame. 1 ... 64.
+    float hit_roughness_min =
+        0.5f;                ///< What gathering rays hit is lit as if no smoother. 0 ... 1; 0: as it is.
+    int direct_samples = 4;  ///< Lights that a pixel samples a frame. 1 ... 64.
 };
 
 struct ScreenProbeSettings {

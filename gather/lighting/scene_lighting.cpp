@@ -67,6 +67,10 @@ std::vector<std::uint8_t> choose_emitters(const core::Scene& scene, double radiu
     return chosen;
 }
 
+double scene_radius(const core::Scene& scene) {
+    return scene.instances.empty() ? 1.0 : 0.5 * glm::length(core::world_bounds(scene).extent());
+}
+
 float sky_ratio(const LightingSettings& settings) {
     switch (settings.sampled_emitters) {
         case SampledEmitters::kNone:
@@ -106,25 +110,29 @@ glm::vec3 light_by_lobe(const core::Scene& scene, const core::LightSampler& samp
 
 }  // namespace
 
+bool gathers_anything(const core::Scene& scene, const LightingSettings& settings) {
+    if (!core::split_sky(scene.sky, sky_ratio(settings)).base.black()) return true;
+    const std::vector<std::uint8_t> sampled = choose_emitters(scene, scene_radius(scene), settings);
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+        if (sampled[i] != 0) continue;
+        for (const std::uint32_t material : scene.instances[i].materials) {
+            if (scene.materials[material].emissive()) return true;
+        }
+    }
+    return false;
+}
+
 SceneLighting::SceneLighting(const core::Scene& scene, const core::Tracer& tracer,
                              const LightingSettings& settings)
     : everything_(scene), sky_(core::split_sky(scene.sky, sky_ratio(settings))) {
-    const core::DoubleBounds bounds = core::world_bounds(scene);
-    const double radius = scene.instances.empty() ? 1.0 : 0.5 * glm::length(bounds.extent());
+    const double radius = scene_radius(scene);
     trace_limit_ = static_cast<float>(std::min(4.0 * radius, 1e30));
     sampled_emitters_ = choose_emitters(scene, radius, settings);
     sampled_.emplace(scene, core::LightSubset{sky_.peaks.black() ? nullptr : &sky_.peaks, sampled_emitters_});
     samples_extended_ = !sky_.peaks.black() || std::any_of(sampled_emitters_.begin(), sampled_emitters_.end(),
                                                            [](std::uint8_t chosen) { return chosen != 0; });
     start_offsets_.resize(scene.instances.size());
-    gathers_anything_ = !sky_.base.black();
-    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
-        start_offsets_[i] = tracer.start_offset(i);
-        if (sampled_emitters_[i] != 0) continue;
-        for (const std::uint32_t material : scene.instances[i].materials) {
-            gathers_anything_ = gathers_anything_ || scene.materials[material].emissive();
-        }
-    }
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) start_offsets_[i] = tracer.start_offset(i);
 }
 
 int SceneLighting::direct_samples(int wanted) const {
@@ -230,7 +238,11 @@ HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::
             !(emission && scene_.material_of(hit.instance, hit.triangle).emissive())) {
             continue;
         }
-        const core::SurfacePoint surface = core::surface_at(scene_, ray, hit);
+        core::SurfacePoint surface = core::surface_at(scene_, ray, hit);
+        if (surface.roughness < roughness_min_) {
+            surface.roughness = roughness_min_;
+            surface.brdf.alpha = std::max(surface.brdf.alpha, roughness_min_ * roughness_min_);
+        }
         if (emission) radiance[i] += surface.emission;
         if (bounced_) radiance[i] += bounced_(surface, -ray.direction);
         if (!direct_) continue;

@@ -22,6 +22,9 @@
 
 namespace gather {
 
+/// Whether any light is left to U, to be found by rays that meet it.
+bool gathers_anything(const core::Scene& scene, const LightingSettings& settings);
+
 /// Which part of the light each way of finding it brings. Immutable once built; thread-safe.
 class SceneLighting {
 public:
@@ -46,9 +49,6 @@ public:
     /// points and suns, which leave hardly a penumbra to sample.
     int direct_samples(int wanted) const;
 
-    /// Whether gathering rays can bring light without any bounce.
-    bool gathers_anything() const { return gathers_anything_; }
-
     /// S, for surfaces whose light is gathered, too.
     const core::LightSampler& sampled() const { return *sampled_; }
 
@@ -67,7 +67,6 @@ private:
     std::optional<core::LightSampler> sampled_;
     std::vector<float> start_offsets_;
     float trace_limit_ = 1.0f;
-    bool gathers_anything_ = false;
     bool samples_extended_ = false;  ///< Emitters or sky are in S.
 };
 
@@ -119,9 +118,17 @@ class HitLighting {
 public:
     using Bounced = glm::vec3 (*)(const core::SurfacePoint& surface, const glm::vec3& outgoing);
 
+    /// @param roughness_min smoother surfaces are lit as if this rough (Kaplanyan and Dachsbacher, "Path
+    /// Space Regularization for Holistic and Robust Light Transport", 2013): a lamp that few rays see
+    /// mirrored would shine on all that read their probe
     HitLighting(const core::Scene& scene, const core::Tracer& tracer, const SceneLighting& lighting,
-                bool direct_light, Bounced bounced = nullptr)
-        : scene_(scene), tracer_(tracer), lighting_(lighting), direct_(direct_light), bounced_(bounced) {}
+                bool direct_light, float roughness_min, Bounced bounced = nullptr)
+        : scene_(scene),
+          tracer_(tracer),
+          lighting_(lighting),
+          direct_(direct_light),
+          roughness_min_(roughness_min),
+          bounced_(bounced) {}
 
     /// @param keys of the random numbers, one a ray; `frame` their index
     /// @param radiance as long as rays
@@ -134,6 +141,7 @@ private:
     const core::Tracer& tracer_;
     const SceneLighting& lighting_;
     bool direct_;
+    float roughness_min_;
     Bounced bounced_;
 };
 

@@ -25,7 +25,7 @@ from shared_scenes import scene_files
 
 TRUTH = {"screen_probes__spacing": 1, "screen_probes__resolution": 16, "screen_probes__importance_sampling": "off",
          "screen_probes__spatial_filter": "off", "screen_probes__jitter_interpolation": "off",
-         "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16}
+         "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16, "lighting__hit_roughness_min": 0}
 LEDGER = {
     "SH3": {"integrate__diffuse": "sh"},
     "filter": {"screen_probes__spatial_filter": "on"},
