@@ -99,6 +99,7 @@ public:
 
 private:
     void gather_light(std::uint32_t frame);
+    void remember_openness(std::uint32_t frame);
     void accumulate();
     void add_probe_layers(core::Image& image) const;
 
@@ -117,7 +118,8 @@ private:
     bool has_last_ = false;
     std::vector<ProbeWeights> weights_;
     std::vector<BentNormal> bent_;
-    std::vector<glm::vec3> near_irradiance_;
+    std::vector<NearLight> near_light_;
+    std::vector<float> openness_;  ///< Mean visibility over the frames so far.
 };
 
 void Picture::gather_light(std::uint32_t frame) {
@@ -172,9 +174,10 @@ void Picture::gather_light(std::uint32_t frame) {
     if (bent) {
         BentNormalRays rays;
         ledger_.time("bent_normal", [&] {
-            const NearLighting near{hit_lighting_, atlas_, weights_};
+            const NearLighting near{hit_lighting_, atlas_, weights_, openness_};
             rays = trace_bent_normals(inputs_, visible_, settings_.integrate, frame, traced ? &near : nullptr,
-                                      bent_, near_irradiance_);
+                                      bent_, near_light_);
+            if (traced) remember_openness(frame);
             return PassRays{rays.short_rays, rays.exhausted};
         });
         if (traced) ledger_.time("bent_normal_shadows", [&] { return PassRays{rays.shadow_rays, 0}; });
@@ -185,10 +188,18 @@ void Picture::gather_light(std::uint32_t frame) {
         static const std::vector<BentNormal> kOpen;
         diffuse_.assign(visible_.depth.size(), glm::vec3(0.0f));
         specular_.assign(visible_.depth.size(), glm::vec3(0.0f));
-        integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_irradiance_, diffuse_);
+        integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_light_, diffuse_);
         integrate_specular(in, weights_, directional, specular_);
         return PassRays{};
     });
+}
+
+void Picture::remember_openness(std::uint32_t frame) {
+    openness_.resize(bent_.size(), 0.0f);
+    const float share = 1.0f / static_cast<float>(frame + 1);
+    for (std::size_t pixel = 0; pixel < bent_.size(); ++pixel) {
+        openness_[pixel] += share * (bent_[pixel].visibility - openness_[pixel]);
+    }
 }
 
 void Picture::accumulate() {
@@ -293,8 +304,8 @@ std::uint64_t FinalGather::picture_bytes(int width, int height, const Settings& 
     Plan everything;
     for (PlannedEffect& effect : everything.effects) effect.on = true;
     return probe_cache_bytes(everything, width, height, settings) + Accumulation::bytes(width, height, aovs) +
-           pixels *
-               (kVisibleSurfaceBytes + 4 * sizeof(glm::vec3) + sizeof(ProbeWeights) + sizeof(BentNormal));
+           pixels * (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + sizeof(NearLight) + sizeof(float) +
+                     sizeof(ProbeWeights) + sizeof(BentNormal));
 }
 
 core::Frame FinalGather::render(const core::RenderInputs& inputs) {

@@ -27,12 +27,11 @@ struct ShortRays {
     std::vector<std::uint8_t> occluded;
 };
 
-/// Those that hit, with what they bring more than the probes say.
+/// Those whose hits are shaded.
 struct NearHits {
     core::RayStream rays;
     core::HitStream hits;
     std::vector<std::uint32_t> keys;
-    std::vector<std::size_t> pixels;
     std::vector<glm::vec3> radiance;
 };
 
@@ -48,7 +47,7 @@ public:
 
     void trace(std::size_t first, std::size_t last, const NearLighting* near, ShortRays& out) const;
     void bend(const ShortRays& in, std::vector<BentNormal>& result) const;
-    void shade(const NearLighting& near, const ShortRays& in, std::vector<glm::vec3>& near_irradiance,
+    void shade(const NearLighting& near, const ShortRays& in, std::vector<NearLight>& result,
                HitLightingCounters& counters) const;
 
 private:
@@ -127,8 +126,8 @@ void BentNormalPass::bend(const ShortRays& in, std::vector<BentNormal>& result) 
     }
 }
 
-void BentNormalPass::shade(const NearLighting& near, const ShortRays& in,
-                           std::vector<glm::vec3>& near_irradiance, HitLightingCounters& counters) const {
+void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::vector<NearLight>& result,
+                           HitLightingCounters& counters) const {
     NearHits found;
     std::size_t count = 0;
     for (std::size_t i = 0; i < in.pixels.size(); ++i) count += in.occluded[i] || in.alone[i] ? 1 : 0;
@@ -138,21 +137,28 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in,
     found.radiance.resize(count);
     for (std::size_t i = 0; i < in.pixels.size(); ++i) {
         if (!in.occluded[i] && !in.alone[i]) continue;
-        found.rays.set(found.pixels.size(), in.rays.get(i));
-        found.hits.set(found.pixels.size(), in.hits.get(i));
+        found.rays.set(found.keys.size(), in.rays.get(i));
+        found.hits.set(found.keys.size(), in.hits.get(i));
         found.keys.push_back(in.keys[i]);
-        found.pixels.push_back(in.pixels[i]);
     }
     counters = near.hit_lighting.shade(found.rays, found.hits, found.keys, frame_, found.radiance);
     const float share = core::kPi / static_cast<float>(rays_a_pixel_);
-    for (std::size_t i = 0; i < count; ++i) {
-        const ProbeWeights& weights = near.weights[found.pixels[i]];
-        const glm::vec2 at = core::octahedral_from_direction(found.rays.get(i).direction);
+    std::size_t shaded = 0;
+    for (std::size_t i = 0; i < in.pixels.size(); ++i) {
+        const std::size_t pixel = in.pixels[i];
+        NearLight& light = result[pixel];
+        const bool has_own = in.occluded[i] || in.alone[i];
+        glm::vec3 own(0.0f);
+        if (has_own) own = found.radiance[shaded++];
         glm::vec3 held(0.0f);
-        for (std::size_t k = 0; weights.confident && k < weights.count; ++k) {
-            held += weights.weight[k] * near.atlas.read(weights.probe[k], at);
+        if (light.probe_share > 0.0f && (has_own || light.probe_share < 1.0f)) {
+            const ProbeWeights& weights = near.weights[pixel];
+            const glm::vec2 at = core::octahedral_from_direction(in.rays.get(i).direction);
+            for (std::size_t k = 0; k < weights.count; ++k) {
+                held += weights.weight[k] * near.atlas.read(weights.probe[k], at);
+            }
         }
-        near_irradiance[found.pixels[i]] += share * (found.radiance[i] - held);
+        light.irradiance += share * ((has_own ? own : held) - light.probe_share * held);
     }
 }
 
@@ -161,13 +167,21 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in,
 BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
                                   const IntegrateSettings& settings, std::uint32_t frame,
                                   const NearLighting* near, std::vector<BentNormal>& result,
-                                  std::vector<glm::vec3>& near_irradiance) {
+                                  std::vector<NearLight>& near_light) {
     result.resize(visible.depth.size());
     for (std::size_t pixel = 0; pixel < result.size(); ++pixel) {
         result[pixel] = {visible.surface(pixel) ? visible.points[pixel].frame.normal : BentNormal{}.direction,
                          1.0f};
     }
-    near_irradiance.assign(near ? visible.depth.size() : 0, glm::vec3(0.0f));
+    near_light.assign(near ? visible.depth.size() : 0, NearLight{});
+    for (std::size_t pixel = 0; pixel < near_light.size(); ++pixel) {
+        if (!visible.surface(pixel)) continue;
+        if (!near->weights[pixel].confident) {
+            near_light[pixel].probe_share = 0.0f;
+        } else if (!near->openness.empty()) {
+            near_light[pixel].probe_share = near->openness[pixel];
+        }
+    }
     const BentNormalPass pass(inputs, visible, settings, frame);
     std::atomic<std::uint64_t> short_rays{0}, shadow_rays{0}, exhausted{0};
     core::parallel_for(static_cast<std::size_t>(visible.height), 2, [&](std::size_t begin, std::size_t end) {
@@ -177,7 +191,7 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
         pass.trace(begin * width, end * width, near, found);
         pass.bend(found, result);
         HitLightingCounters counters;
-        if (near) pass.shade(*near, found, near_irradiance, counters);
+        if (near) pass.shade(*near, found, near_light, counters);
         short_rays += found.pixels.size();
         shadow_rays += counters.shadow_rays;
         exhausted += counters.exhausted;

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "core/math/spherical_harmonics.h"
@@ -34,6 +35,17 @@ struct NearLighting {
     const HitLighting& hit_lighting;
     const ProbeAtlas& atlas;
     const std::vector<ProbeWeights>& weights;  ///< A pixel's.
+    /// Mean visibility of each pixel over the frames before; empty in the first. Never of this frame's rays:
+    /// what they decide may not depend on them, or the mean would be wrong.
+    std::span<const float> openness;
+};
+
+/// A pixel's irradiance is probe_share times the probes', and this. The share is the coefficient of the
+/// control variate: 1 in the open, where the rays then add nothing; in a crease, where the probes' light is
+/// hardly seen, their noise would be that of subtracting it.
+struct NearLight {
+    glm::vec3 irradiance{0.0f};  ///< Of either sign.
+    float probe_share = 1.0f;
 };
 
 struct BentNormalRays {
@@ -45,11 +57,11 @@ struct BentNormalRays {
 /// Traces `integrate.bent_normal_rays` short rays a pixel, whole ones with `near` where a pixel has no probe.
 /// Their length is what `bent_normal_pixels` span on the screen at the pixel's distance.
 /// @param near nullptr: hits are not shaded
-/// @param near_irradiance what to add to each pixel's irradiance, of either sign; left empty without `near`
+/// @param near_light empty without `near`
 BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
                                   const IntegrateSettings& settings, std::uint32_t frame,
                                   const NearLighting* near, std::vector<BentNormal>& result,
-                                  std::vector<glm::vec3>& near_irradiance);
+                                  std::vector<NearLight>& near_light);
 
 /// Ambient occlusion with the light that nearby surfaces of this albedo send back.
 float multi_bounce(float visibility, float albedo);

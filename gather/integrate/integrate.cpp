@@ -90,7 +90,7 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
 }
 
 void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
-                       const std::vector<BentNormal>& bent, const std::vector<glm::vec3>& near_irradiance,
+                       const std::vector<BentNormal>& bent, const std::vector<NearLight>& near_light,
                        std::vector<glm::vec3>& diffuse) {
     const VisibleSurfaces& visible = in.visible;
     core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
@@ -101,18 +101,20 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
             const glm::vec3& normal = point.frame.normal;
             const glm::vec3 albedo = diffuse_albedo(point.brdf, glm::dot(normal, visible.outgoing[pixel]));
             if (albedo == glm::vec3(0.0f)) continue;
-            const bool alone = !near_irradiance.empty() && !weights[pixel].confident;
-            glm::vec3 arriving =
-                alone ? glm::vec3(0.0f) : irradiance(in, weights[pixel], normal, cosine_weights);
+            const NearLight near = near_light.empty() ? NearLight{} : near_light[pixel];
+            glm::vec3 arriving(0.0f);
+            if (near.probe_share > 0.0f) {
+                arriving = near.probe_share * irradiance(in, weights[pixel], normal, cosine_weights);
+            }
             if (!bent.empty() && bent[pixel].visibility < 1.0f) {
                 const float v = bent[pixel].visibility;
-                const float near = multi_bounce(
+                const float occlusion = multi_bounce(
                     v, std::min(in.settings.near_field_albedo_max, core::luminance(point.brdf.diffuse)));
                 // The open part's share of what the same harmonics give for the whole hemisphere.
                 const core::ShColor sh = mix_sh(in.atlas, weights[pixel]);
-                arriving = cone_irradiance(sh, bent[pixel]) + (near - v) * arriving;
+                arriving = cone_irradiance(sh, bent[pixel]) + (occlusion - v) * arriving;
             }
-            if (!near_irradiance.empty()) arriving += near_irradiance[pixel];
+            arriving += near.irradiance;
             diffuse[pixel] += albedo / core::kPi * arriving;
         }
     });

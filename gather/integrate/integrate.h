@@ -27,10 +27,9 @@ struct IntegrateInputs {
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights);
 
 /// Light that the diffuse lobe sends to the eye, added to `diffuse`. @param bent what the probes are
-/// seen through; empty: everything is open. @param near_irradiance may be empty;
-/// added to the probes', and alone where no probe lies on the surface
+/// seen through; empty: everything is open. @param near_light may be empty
 void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
-                       const std::vector<BentNormal>& bent, const std::vector<glm::vec3>& near_irradiance,
+                       const std::vector<BentNormal>& bent, const std::vector<NearLight>& near_light,
                        std::vector<glm::vec3>& diffuse);
 
 /// Light of the specular lobe. Surfaces smoother than settings.rough_specular_max reflect the probes in
