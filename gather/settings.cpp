@@ -129,7 +129,7 @@ const std::vector<Knob>& knobs() {
         flag("screen_probes.clamp_hit_distance", kP, &P::clamp_hit_distance,
              "a neighbour's hit is no farther than one's own: keeps contact shadows"),
         number("screen_probes.culled_weight", kP, &P::culled_weight, 0.0f, 1.0f,
-               "own weight of texels without rays, in the filter"),
+               "of what neighbours gave a texel without rays, in later passes of the filter"),
         number("screen_probes.max_ray_intensity", kP, &P::max_ray_intensity, 0.0f, 1e12f,
                "cd/m^2; clamps brighter rays, which darkens the picture; 0: off"),
         choice("integrate.diffuse", kI, &I::diffuse,

@@ -44,8 +44,8 @@ struct ScreenProbeSettings {
     int filter_passes = 3;              ///< 1 ... 8.
     float filter_angle = 10.0f;         ///< Degrees; a neighbour's ray that deviates by more is left out.
     bool clamp_hit_distance = true;     ///< A neighbour's hit is no farther than one's own: keeps contacts.
-    float culled_weight = 0.1f;         ///< Own weight of texels without rays, in the filter. 0 ... 1.
-    float max_ray_intensity = 0.0f;     ///< cd/m^2 of luminance; clamps brighter rays; 0: no clamp.
+    float culled_weight = 0.1f;  ///< Of what neighbours gave a texel without rays, in later passes. 0 ... 1.
+    float max_ray_intensity = 0.0f;  ///< cd/m^2 of luminance; clamps brighter rays; 0: no clamp.
 };
 
 /// How the probes' light becomes irradiance.

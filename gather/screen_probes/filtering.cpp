@@ -36,7 +36,9 @@ void filter_probes(const ScreenProbeSettings& settings, const TexelTable& table,
                 std::uint8_t* out_known = known_after.data() + p * texels;
                 for (std::size_t t = 0; t < texels; ++t) {
                     out_known[t] = known[p * texels + t];
-                    weights[t] = out_known[t] ? 1.0f : settings.culled_weight;
+                    // A culled texel holds nothing before it is filled, and little of its own then.
+                    const bool traced = atlas.ray_count[p * texels + t] > 0;
+                    weights[t] = traced ? 1.0f : out_known[t] ? settings.culled_weight : 0.0f;
                     out[t] = weights[t] * atlas.radiance[p * texels + t];
                 }
                 const glm::ivec2 tile = own.pixel / atlas.spacing;

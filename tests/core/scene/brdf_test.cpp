@@ -61,6 +61,29 @@ TEST_P(BrdfCase, SamplesFollowTheirDensity) {
     EXPECT_GT(p, tests::sidak_alpha(0.01, static_cast<int>(std::size(kCases))));
 }
 
+TEST_P(BrdfCase, SpecularSamplesFollowTheDensityOfTheirLobe) {
+    const core::Brdf brdf = brdf_of(GetParam());
+    const glm::vec3 outgoing = outgoing_of(GetParam());
+    // Of a metal sample() knows no other lobe, and visible normals do not depend on the colour.
+    core::Brdf metal = brdf;
+    metal.diffuse = glm::vec3(0.0f);
+    metal.f0 = glm::vec3(1.0f);
+    metal.f90 = glm::vec3(1.0f);
+    tests::ChiSquareSettings settings;
+    settings.integration_points = 24;
+    const double p = tests::chi_square_p_value(
+        [&](const glm::vec2& u, float) -> std::optional<glm::vec3> {
+            const core::BrdfSample sample = core::sample_specular(brdf, outgoing, u);
+            if (!(sample.pdf > 0.0f)) return std::nullopt;
+            EXPECT_NEAR(sample.pdf, core::evaluate(metal, outgoing, sample.incoming).pdf, 1e-4f * sample.pdf);
+            EXPECT_EQ(sample.value.diffuse, glm::vec3(0.0f));
+            EXPECT_EQ(sample.value.specular, core::evaluate(brdf, outgoing, sample.incoming).value.specular);
+            return sample.incoming;
+        },
+        [&](const glm::vec3& d) { return core::evaluate(metal, outgoing, d).pdf; }, settings);
+    EXPECT_GT(p, tests::sidak_alpha(0.01, static_cast<int>(std::size(kCases))));
+}
+
 TEST_P(BrdfCase, SampleAgreesWithEvaluateAndPdf) {
     const core::Brdf brdf = brdf_of(GetParam());
     const glm::vec3 outgoing = outgoing_of(GetParam());
