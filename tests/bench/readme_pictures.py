@@ -8,7 +8,6 @@
 """
 
 import argparse
-import json
 import os
 import pathlib
 import subprocess
@@ -18,7 +17,8 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 COMMON = ["--size", "320x240", "--renderer", "path", "--spp", "64"]
 
-GATHER_VIEWS = ("cornell_box", "two_rooms", "living_room_godot")
+# Views of --gather, and the EV100 of their pictures.
+EXPOSURES = {"two_rooms": "3.5", "zdm2_level": "-0.5", "cornell_box": "5"}
 
 # name, scene ({shared} is $FIELDLIGHT_SHARED), further flags
 PICTURES = [
@@ -40,32 +40,16 @@ def command(program, entry, kind, output, shared):
 
 
 def render_gather(options, target, folder):
-    """gather | path at equal time | reference, of GATHER_VIEWS."""
-    views = json.loads((ROOT / "tests/images/views.json").read_text())["views"]
-    for view in views:
-        if view["name"] not in GATHER_VIEWS or options.only not in (None, view["name"]):
-            continue
-        scene = view["scene"].replace("shared:", options.shared + "/")
-        seconds = None
-        for kind in ("gather", "path", "reference"):
-            cached = pathlib.Path(options.cache) / f"picture.{view['name']}.{options.size}.{options.spp}.png"
-            picture = target / f"{view['name']}.{kind}.png"
-            if kind == "reference" and cached.exists():
-                picture.write_bytes(cached.read_bytes())
-                continue
-            output = pathlib.Path(folder) / f"{view['name']}.{kind}.exr"
-            flags = {"gather": ["--renderer", "gather", "--accumulate", "16"],
-                     "path": ["--renderer", "path", "--spp", "1048576", "--time-budget", str(seconds)],
-                     "reference": ["--renderer", "path", "--spp", str(options.spp), "--seed", "987654"]}[kind]
-            stats = output.with_suffix(".json")
-            subprocess.run([options.fieldlight, "render", scene, "-o", str(output), "--png", "--size", options.size,
-                            "--tracer", "triangle", "--bounces", "1", "--quiet", "--stats", str(stats)] +
-                           view["camera"] + view["light"] + flags, check=True, cwd=ROOT)
-            seconds = seconds or json.loads(stats.read_text())["seconds"]["render"]
-            picture.write_bytes(output.with_suffix(".png").read_bytes())
-            if kind == "reference":
-                cached.parent.mkdir(parents=True, exist_ok=True)
-                cached.write_bytes(picture.read_bytes())
+    """gather | path at equal time | reference, each view at one exposure; names as gather_table.py's references."""
+    from gather_common import Runner, load_views
+    run = Runner(options, folder)
+    for view in load_views(options):
+        pictures = {"gather": None, "path": None, "reference": run.reference(view)}
+        pictures["gather"], stats = run.gather(view)
+        pictures["path"], _ = run.path(view, "--spp", 1048576, "--time-budget", stats["seconds"]["render"])
+        for kind, picture in pictures.items():
+            subprocess.run([options.fieldlight, "convert", str(picture), str(target / f"{view['name']}.{kind}.png"),
+                            "--exposure", EXPOSURES[view["name"]], "--quiet"], check=True)
 
 
 def markdown():
@@ -88,9 +72,11 @@ def main():
     parser.add_argument("--shared", default=os.environ.get("FIELDLIGHT_SHARED", str(ROOT.parent / "shared")))
     parser.add_argument("--only")
     parser.add_argument("--gather", action="store_true", help="the pictures of the gather's proofs instead")
-    parser.add_argument("--size", default="400x300", help="of --gather")
-    parser.add_argument("--spp", type=int, default=4096, help="of the references of --gather")
+    parser.add_argument("--size", default="640x360", help="of --gather")
+    parser.add_argument("--reference-spp", type=int, default=2048, help="of the references of --gather")
     parser.add_argument("--cache", default="/tmp/fieldlight_references", help="keeps the references of --gather")
+    parser.add_argument("--views", default=",".join(EXPOSURES), help="of --gather")
+    parser.set_defaults(threads=0, frames=16)
     parser.add_argument("--target", default=str(ROOT / "assets/pictures"), help="folder of the pictures")
     parser.add_argument("--markdown", action="store_true")
     options = parser.parse_args()
