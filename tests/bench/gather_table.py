@@ -25,7 +25,8 @@ from shared_scenes import scene_files
 
 TRUTH = {"screen_probes__spacing": 1, "screen_probes__resolution": 16, "screen_probes__importance_sampling": "off",
          "screen_probes__spatial_filter": "off", "screen_probes__jitter_interpolation": "off",
-         "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16, "lighting__hit_roughness_min": 0}
+         "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16,
+         "lighting__hit_roughness_min": 0}
 LEDGER = {
     "SH3": {"integrate__diffuse": "sh"},
     "filter": {"screen_probes__spatial_filter": "on"},
@@ -62,7 +63,7 @@ PROOF = {
     "lighting_pdf": (DARK_SCENE, "assets/two_rooms.glb", 4, []),
     "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
     "rough_specular": ("assets/cornell_box.glb", "shared:scenes/suzanne/Suzanne.gltf", 8, ["--sky=1,1,1"]),
-    "bent_normal": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
+    "bent_normal": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
     "temporal": ("assets/thin_walls.glb", "assets/thin_walls.glb", 8, []),
 }
 
