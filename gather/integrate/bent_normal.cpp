@@ -173,13 +173,16 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
         result[pixel] = {visible.surface(pixel) ? visible.points[pixel].frame.normal : BentNormal{}.direction,
                          1.0f};
     }
-    near_light.assign(near ? visible.depth.size() : 0, NearLight{});
-    for (std::size_t pixel = 0; pixel < near_light.size(); ++pixel) {
-        if (!visible.surface(pixel)) continue;
-        if (!near->weights[pixel].confident) {
-            near_light[pixel].probe_share = 0.0f;
-        } else if (!near->openness.empty()) {
-            near_light[pixel].probe_share = near->openness[pixel];
+    near_light.clear();
+    if (near) {
+        near_light.assign(visible.depth.size(), NearLight{});
+        for (std::size_t pixel = 0; pixel < near_light.size(); ++pixel) {
+            if (!visible.surface(pixel)) continue;
+            if (!near->weights[pixel].confident) {
+                near_light[pixel].probe_share = 0.0f;
+            } else if (!near->openness.empty()) {
+                near_light[pixel].probe_share = near->openness[pixel];
+            }
         }
     }
     const BentNormalPass pass(inputs, visible, settings, frame);
