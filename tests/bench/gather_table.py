@@ -285,7 +285,7 @@ def main():
     parser.add_argument("--only", help="of proof: effects with commas between")
     parser.add_argument("--rounds", type=int, default=5, help="of speed")
     options = parser.parse_args()
-    options.size = options.size or {"truth": "96x72", "effects": "64x48", "proof": "160x120",
+    options.size = options.size or {"truth": "96x72", "effects": "64x48", "proof": "320x240",
                                     "speed": "1280x720"}.get(options.what, "640x360")
     options.seeds = options.seeds or (8 if options.what == "proof" else 4)
     if options.what == "truth" and options.seeds < 2:
