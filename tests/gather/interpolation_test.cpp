@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/trace/triangle_tracer.h"
+#include "gather/integrate/integrate.h"
 #include "gather/lighting/scene_lighting.h"
 #include "gather/screen_probes/near_field.h"
 
@@ -98,6 +99,50 @@ TEST(NearField, ATexelThatEndsNearTakesWhatItsNeighboursSeeBeyond) {
     EXPECT_EQ(atlas.hit_distance[4 * texels + 3], 10.0f);
     EXPECT_EQ(atlas.radiance[4 * texels + 5], glm::vec3(7.0f));
     EXPECT_EQ(atlas.radiance[3 * texels + 3], glm::vec3(2.0f));
+}
+
+/// Probes that hold 1 everywhere: a lobe sends back its directional albedo, sampled here with other numbers.
+TEST(IntegrateSpecular, ConstantProbesGiveTheDirectionalAlbedo) {
+    gather::ProbeAtlas atlas = grazing_atlas();
+    for (glm::vec3& value : atlas.radiance) value = glm::vec3(1.0f);
+    gather::VisibleSurfaces visible;
+    visible.resize(1, 1);
+    visible.depth[0] = 2.0f;
+    visible.outgoing[0] = glm::normalize(glm::vec3(0.4f, 1.0f, 0.1f));
+    core::SurfacePoint& point = visible.points[0];
+    point.geometric_normal = kUp;
+    point.frame = core::ShadingFrame::from_normal(kUp);
+    gather::ProbeWeights weights;
+    weights.probe = {0, 4};
+    weights.weight = {0.25f, 0.75f};
+    weights.count = 2;
+    gather::IntegrateSettings settings;
+    settings.specular_directions = 64;
+    const gather::TexelTable table(atlas.resolution);
+    for (const float roughness : {0.2f, 0.5f, 0.8f}) {
+        SCOPED_TRACE(roughness);
+        point.roughness = roughness;
+        point.brdf = core::Brdf{};
+        point.brdf.diffuse = glm::vec3(0.0f);
+        point.brdf.f0 = glm::vec3(0.7f);
+        point.brdf.alpha = roughness * roughness;
+        std::vector<glm::vec3> specular(1, glm::vec3(0.0f));
+        constexpr std::uint32_t kFrames = 64;
+        for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
+            gather::integrate_specular({visible, atlas, table, {}, settings, 1, frame}, {weights}, true,
+                                       specular);
+        }
+        double albedo = 0.0;
+        constexpr std::uint32_t kCount = 1u << 14;
+        for (std::uint32_t i = 0; i < kCount; ++i) {
+            const core::BrdfSample chosen =
+                core::sample(point.brdf, point.frame.to_local(visible.outgoing[0]), 0.5f,
+                             core::SampleSequence(3, i).point(0));
+            if (!(chosen.pdf > 0.0f)) continue;
+            albedo += static_cast<double>(chosen.value.specular.x * chosen.incoming.z / chosen.pdf) / kCount;
+        }
+        EXPECT_NEAR(static_cast<double>(specular[0].x) / kFrames / albedo, 1.0, 0.01);
+    }
 }
 
 /// A smooth metal under a constant sky that is sampled: light sampling and the lobe's own ray together bring
