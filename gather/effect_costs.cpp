@@ -35,12 +35,15 @@ std::vector<std::string_view> passes_of(Effect effect) {
         case Effect::kRoughSpecular:
             return {"integrate"};
         case Effect::kBentNormal:
-            return {"bent_normal", "bent_normal_shadows", "integrate"};
+            return {"near_field", "bent_normal", "bent_normal_shadows", "integrate"};
         case Effect::kTemporal:
             return {"accumulate"};
     }
     return {};
 }
+
+/// Of a texel, while near fields are taken out: the light and the distance written beside those read.
+constexpr std::uint64_t kNearCopyBytes = sizeof(glm::vec3) + sizeof(float);
 
 std::uint64_t bytes_of(Effect effect, const Plan& plan, int width, int height, const Settings& settings) {
     if (!plan.on(effect)) return 0;
@@ -60,9 +63,13 @@ std::uint64_t bytes_of(Effect effect, const Plan& plan, int width, int height, c
             return (uniform + adaptive) * one_probe;
         case Effect::kSpatialFilter:  // A pass reads one copy of the light and writes the other.
             return (uniform + adaptive) * edge * edge * (sizeof(glm::vec3) + 2);
-        case Effect::kBentNormal:
-            return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
-                   sizeof(BentNormal);
+        case Effect::kBentNormal: {
+            // The near field besides: a pixel's light and how open it was, and a copy of the probes' texels.
+            const bool traced = settings.integrate.near_field == NearField::kTraced;
+            const std::uint64_t pixel = sizeof(BentNormal) + (traced ? sizeof(NearLight) + sizeof(float) : 0);
+            return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) * pixel +
+                   (traced ? (uniform + adaptive) * edge * edge * kNearCopyBytes : 0);
+        }
         default:  // They keep nothing of their own.
             return 0;
     }

@@ -155,7 +155,7 @@ void Picture::gather_light(std::uint32_t frame) {
     const bool bent = plan_.on(Effect::kBentNormal);
     const bool traced = settings_.integrate.near_field == NearField::kTraced;
     if (bent && traced) {
-        ledger_.time("filter_probes", [&] {
+        ledger_.time("near_field", [&] {
             take_out_near_field(probes, visible_, settings_.integrate.bent_normal_pixels, atlas_);
             return PassRays{};
         });

@@ -125,10 +125,9 @@ PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting&
                             lobe_pixels.push_back(pixel);
                         }
                     }
-                    const auto arrival =
-                        sample_light(lighting, lighting.sampled(), visible.points[pixel],
-                                     visible.origins[pixel], visible.outgoing[pixel],
-                                     sequence.point(kLight).x, sequence.point(kPoint), sequence.bits(kAlpha));
+                    const auto arrival = sample_light(
+                        lighting, lighting.sampled(), point, visible.origins[pixel], visible.outgoing[pixel],
+                        sequence.point(kLight).x, sequence.point(kPoint), sequence.bits(kAlpha));
                     if (!arrival) continue;
                     rays.set(pixels.size(), arrival->shadow_ray);
                     pixels.push_back(pixel);

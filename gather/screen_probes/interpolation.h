@@ -35,7 +35,7 @@ struct ProbeWeights {
     std::size_t count = 0;
     float support = 0.0f;          ///< Sum of the weights before they were made to sum to 1,
     float surface_support = 0.0f;  ///< and without what they lose by distance along the surface.
-    bool confident = true;         ///< False: no probe lies in the plane; the nearest to it stands in.
+    bool confident = true;         ///< False: no probe lies on the surface; the nearest stands in.
 };
 
 /// How well the light at one point of a surface stands for the light at another, as said above.

@@ -6,8 +6,12 @@ import math
 import pathlib
 import re
 import subprocess
+import tempfile
 
 from shared_scenes import add_shared_option
+
+# Where references are kept between runs, unless --cache says otherwise.
+REFERENCES = str(pathlib.Path(tempfile.gettempdir()) / "fieldlight_references")
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -17,7 +21,7 @@ def add_options(parser):
     add_shared_option(parser)
     parser.add_argument("--size", help="WxH; by default what the command says")
     parser.add_argument("--threads", default="0")
-    parser.add_argument("--cache", default="/tmp/fieldlight_references", help="folder that keeps the references")
+    parser.add_argument("--cache", default=REFERENCES, help="folder that keeps the references")
     parser.add_argument("--views", help="names of tests/images/views.json with commas between; all by default")
     parser.add_argument("--reference-spp", type=int, default=4096)
     parser.add_argument("--frames", type=int, default=16, help="--accumulate of the gather")

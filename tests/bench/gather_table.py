@@ -42,7 +42,7 @@ TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "
               "screen_probes__spatial_filter", "screen_probes__clamp_hit_distance", "integrate__bent_normal",
               "screen_probes__jitter_placement", "screen_probes__jitter_directions",
               "screen_probes__jitter_interpolation", "temporal__accumulate", "integrate__rough_specular"]
-PROBE_PASSES = ("place_probes", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
+PROBE_PASSES = ("place_probes", "near_field", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
 
 
 # Of proof, by effect: a scene that auto drops it in, a scene that needs it, frames, and flags of camera and light.

@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 
+from gather_common import REFERENCES, Runner, load_views
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 COMMON = ["--size", "320x240", "--renderer", "path", "--spp", "64"]
 
@@ -41,7 +43,6 @@ def command(program, entry, kind, output, shared):
 
 def render_gather(options, target, folder):
     """gather | path at equal time | reference, each view at one exposure; names as gather_table.py's references."""
-    from gather_common import Runner, load_views
     run = Runner(options, folder)
     for view in load_views(options):
         pictures = {"gather": None, "path": None, "reference": run.reference(view)}
@@ -74,7 +75,7 @@ def main():
     parser.add_argument("--gather", action="store_true", help="the pictures of the gather's proofs instead")
     parser.add_argument("--size", default="640x360", help="of --gather")
     parser.add_argument("--reference-spp", type=int, default=2048, help="of the references of --gather")
-    parser.add_argument("--cache", default="/tmp/fieldlight_references", help="keeps the references of --gather")
+    parser.add_argument("--cache", default=REFERENCES, help="keeps the references of --gather")
     parser.add_argument("--views", default=",".join(EXPOSURES), help="of --gather")
     parser.set_defaults(threads=0, frames=16)
     parser.add_argument("--target", default=str(ROOT / "assets/pictures"), help="folder of the pictures")

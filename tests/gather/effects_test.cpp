@@ -5,11 +5,9 @@
 #include <set>
 #include <string>
 
-#include "core/scene/scene_loader.h"
-#include "core/trace/triangle_tracer.h"
 #include "gather/effect_costs.h"
-#include "gather/final_gather.h"
 #include "tests/support/analytic_scenes.h"
+#include "tests/support/gather_pictures.h"
 #include "tests/support/render_scenes.h"
 
 namespace {
@@ -18,49 +16,17 @@ using gather::Effect;
 
 constexpr int kWidth = 64, kHeight = 48;
 
-struct Picture {
-    gather::Plan plan;
-    core::Frame frame;
-
+struct Picture : tests::GatherPicture {
     gather::EffectCost cost(Effect effect, const gather::Settings& settings) const {
         return gather::effect_costs(plan, frame.passes, kWidth, kHeight,
                                     settings)[static_cast<std::size_t>(effect)];
     }
 };
 
-Picture render(const core::Scene& scene, const gather::Settings& settings, const char* effects,
+Picture render(const core::Scene& scene, const gather::Settings& settings, const std::string& effects,
                const std::set<std::string>& layers = {}) {
-    const core::TriangleTracer tracer(scene);
-    const core::Camera camera =
-        scene.cameras.empty() ? core::framing(core::world_bounds(scene), 4.0 / 3.0) : scene.cameras.front();
-    Picture picture;
-    picture.plan =
-        gather::make_plan(scene, kWidth, kHeight, settings, gather::parse_effects(effects), layers);
-    picture.frame = gather::FinalGather(settings, picture.plan)
-                        .render({.scene = scene,
-                                 .camera = camera,
-                                 .tracer = tracer,
-                                 .primary = tracer,
-                                 .width = kWidth,
-                                 .height = kHeight,
-                                 .crop = {},
-                                 .seed = 5,
-                                 .aovs = layers,
-                                 .progress = {},
-                                 .stop_requested = {}});
-    return picture;
-}
-
-void expect_same(const core::Image& a, const core::Image& b) {
-    ASSERT_EQ(a.channels().size(), b.channels().size());
-    for (std::size_t i = 0; i < a.channels().size(); ++i) {
-        EXPECT_EQ(a.channels()[i].name, b.channels()[i].name);
-        EXPECT_EQ(a.channels()[i].values, b.channels()[i].values) << a.channels()[i].name;
-    }
-}
-
-core::Scene asset(const std::string& name) {
-    return core::load_scene_file(std::string(FIELDLIGHT_SOURCE_DIR) + "/assets/" + name, {});
+    return {tests::gather_picture(scene, tests::camera_of(scene), settings, effects,
+                                  {.width = kWidth, .height = kHeight, .seed = 5, .aovs = layers})};
 }
 
 core::Scene dark_room() {
@@ -82,8 +48,8 @@ TEST(Effects, AutoEqualsAllInEveryLayer) {
                                                           {"lamp", lamp_alone},
                                                           {"room", tests::area_lit_room()},
                                                           {"mixed", tests::mixed_room()},
-                                                          {"glossy", asset("glossy.glb")},
-                                                          {"walls", asset("thin_walls.glb")}};
+                                                          {"glossy", tests::asset("glossy")},
+                                                          {"walls", tests::asset("thin_walls")}};
     for (const auto& [name, scene] : scenes) {
         for (const int frames : {1, 3}) {
             for (const int bounces : {0, 1}) {
@@ -95,8 +61,8 @@ TEST(Effects, AutoEqualsAllInEveryLayer) {
                     settings.bounces = bounces;
                     settings.screen_probes.spacing = spacing;
                     settings.screen_probes.resolution = 4;
-                    expect_same(render(scene, settings, "auto", layers).frame.image,
-                                render(scene, settings, "all", layers).frame.image);
+                    tests::expect_same_bits(render(scene, settings, "auto", layers).frame.image,
+                                            render(scene, settings, "all", layers).frame.image);
                 }
             }
         }
@@ -108,8 +74,8 @@ TEST(Effects, AutoEqualsAllInTheDarkWithEachLayerAlone) {
     settings.frames = 2;
     for (const char* layer : {"BentNormal", "Probes", "RaysPerTexel", "ProbeWeight"}) {
         SCOPED_TRACE(layer);
-        expect_same(render(dark_room(), settings, "auto", {layer}).frame.image,
-                    render(dark_room(), settings, "all", {layer}).frame.image);
+        tests::expect_same_bits(render(dark_room(), settings, "auto", {layer}).frame.image,
+                                render(dark_room(), settings, "all", {layer}).frame.image);
     }
 }
 
@@ -125,7 +91,7 @@ TEST(Effects, AListWithoutEmissiveSamplingHoldsUnderEverySetting) {
         const Picture listed = render(scene, settings,
                                       "screen_probes,adaptive_probes,lighting_pdf,spatial_filter,bent_normal,"
                                       "temporal");
-        expect_same(listed.frame.image, found.frame.image);
+        tests::expect_same_bits(listed.frame.image, found.frame.image);
         for (const core::PassCost& pass : listed.frame.passes) EXPECT_NE(pass.name, "direct");
     }
 }
@@ -137,8 +103,8 @@ TEST(Effects, EmissiveSamplingLeavesTheSkyAlone) {
     gather::Settings settings;
     settings.frames = 2;
     settings.lighting.sampled_emitters = gather::SampledEmitters::kAll;
-    expect_same(render(scene, settings, "sky,screen_probes,emissive_sampling").frame.image,
-                render(scene, settings, "sky,screen_probes").frame.image);
+    tests::expect_same_bits(render(scene, settings, "sky,screen_probes,emissive_sampling").frame.image,
+                            render(scene, settings, "sky,screen_probes").frame.image);
 }
 
 TEST(Effects, WhatIsOffCostsNothingAndWhatIsOnSomething) {

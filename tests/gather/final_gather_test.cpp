@@ -5,57 +5,31 @@
 
 #include <optional>
 
-#include "core/scene/scene_loader.h"
 #include "core/support/error.h"
 #include "core/support/parallel.h"
 #include "core/trace/triangle_tracer.h"
+#include "tests/support/gather_pictures.h"
 
 namespace {
 
-core::Scene asset(const std::string& name) {
-    return core::load_scene_file(std::string(FIELDLIGHT_SOURCE_DIR) + "/assets/" + name, {});
-}
-
 core::Frame render(const core::Scene& scene, const gather::Settings& settings, const char* effects,
                    int width = 64, int height = 48) {
-    const core::TriangleTracer tracer(scene);
-    const core::Camera camera =
-        scene.cameras.empty() ? core::framing(core::world_bounds(scene), 4.0 / 3.0) : scene.cameras.front();
-    gather::FinalGather renderer(
-        settings, gather::make_plan(scene, width, height, settings, gather::parse_effects(effects)));
-    return renderer.render({.scene = scene,
-                            .camera = camera,
-                            .tracer = tracer,
-                            .primary = tracer,
-                            .width = width,
-                            .height = height,
-                            .crop = {},
-                            .seed = 3,
-                            .aovs = {"IndirectDiffuse", "Depth"},
-                            .progress = {},
-                            .stop_requested = {}});
+    return tests::gather_picture(scene, tests::camera_of(scene), settings, effects,
+                                 {.width = width, .height = height, .aovs = {"IndirectDiffuse", "Depth"}})
+        .frame;
 }
 
-void expect_same(const core::Image& a, const core::Image& b) {
-    ASSERT_EQ(a.channels().size(), b.channels().size());
-    for (std::size_t i = 0; i < a.channels().size(); ++i) {
-        EXPECT_EQ(a.channels()[i].name, b.channels()[i].name);
-        EXPECT_EQ(a.channels()[i].values, b.channels()[i].values) << a.channels()[i].name;
-    }
-}
-
-const char* const kAssets[] = {"cornell_box.glb", "two_rooms.glb", "thin_walls.glb", "glossy.glb",
-                               "instances.glb"};
+const char* const kAssets[] = {"cornell_box", "two_rooms", "thin_walls", "glossy", "instances"};
 
 TEST(FinalGather, PixelsAreTheSameAtAnyThreadCount) {
-    const core::Scene scene = asset("glossy.glb");
+    const core::Scene scene = tests::asset("glossy");
     gather::Settings settings;
     settings.frames = 3;
     std::optional<core::Frame> first;
     for (const int threads : {1, 2, 3, 8}) {
         core::with_thread_limit(threads, [&] {
             const core::Frame frame = render(scene, settings, "auto");
-            if (first) expect_same(frame.image, first->image);
+            if (first) tests::expect_same_bits(frame.image, first->image);
             first = frame;
         });
     }
@@ -64,19 +38,19 @@ TEST(FinalGather, PixelsAreTheSameAtAnyThreadCount) {
 TEST(FinalGather, AutoEqualsAllAndNothingIsNotFinite) {
     for (const char* name : kAssets) {
         SCOPED_TRACE(name);
-        const core::Scene scene = asset(name);
+        const core::Scene scene = tests::asset(name);
         for (const int frames : {1, 3}) {
             gather::Settings settings;
             settings.frames = frames;
             const core::Frame automatic = render(scene, settings, "auto");
             EXPECT_EQ(core::count_nonfinite(automatic.image), 0u);
-            expect_same(automatic.image, render(scene, settings, "all").image);
+            tests::expect_same_bits(automatic.image, render(scene, settings, "all").image);
         }
     }
 }
 
 TEST(FinalGather, PassesThatAreOffTakeNoTimeAndNoRays) {
-    const core::Scene scene = asset("cornell_box.glb");
+    const core::Scene scene = tests::asset("cornell_box");
     gather::Settings settings;
     settings.frames = 1;
     const core::Frame frame = render(scene, settings, "emissive_sampling");
@@ -89,7 +63,7 @@ TEST(FinalGather, PassesThatAreOffTakeNoTimeAndNoRays) {
 /// A constant sky about a convex Lambert body: every point sends back rho E / pi = rho, and no light comes
 /// from elsewhere.
 TEST(FinalGather, ConvexBodyInAConstantSkyIsAFurnace) {
-    core::Scene scene = asset("instances.glb");
+    core::Scene scene = tests::asset("instances");
     scene.lights.clear();
     scene.sky = core::Sky::constant(glm::vec3(1.0f));
     // A single body: its own hits return nothing but what a convex body cannot meet.
@@ -125,7 +99,7 @@ TEST(FinalGather, ConvexBodyInAConstantSkyIsAFurnace) {
 /// The front rim of the Cornell box faces the dark: nothing lights it. Without adaptive probes hardly any
 /// stands on it, and those of the lit walls within, which do, must not stand in.
 TEST(FinalGather, SurfacesWithoutAProbeTraceTheirOwnRays) {
-    const core::Scene scene = asset("cornell_box.glb");
+    const core::Scene scene = tests::asset("cornell_box");
     gather::Settings settings;
     settings.frames = 4;
     settings.screen_probes.adaptive = false;
@@ -155,7 +129,7 @@ TEST(FinalGather, SurfacesWithoutAProbeTraceTheirOwnRays) {
 }
 
 TEST(FinalGather, RefusesLayersItDoesNotKnow) {
-    const core::Scene scene = asset("cornell_box.glb");
+    const core::Scene scene = tests::asset("cornell_box");
     const core::TriangleTracer tracer(scene);
     gather::FinalGather renderer({}, {});
     EXPECT_THROW(renderer.render({.scene = scene,

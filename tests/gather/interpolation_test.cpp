@@ -7,6 +7,7 @@
 #include "gather/integrate/integrate.h"
 #include "gather/lighting/scene_lighting.h"
 #include "gather/screen_probes/near_field.h"
+#include "tests/gather/constant_atlas.h"
 
 namespace {
 
@@ -37,31 +38,28 @@ TEST(SurfaceWeight, PlanesAreAskedFromBothSides) {
     EXPECT_LT(gather::surface_weight({0.1f, 0, 0}, kUp, 1.0f, {0, 0, 0}, slope, 1e5f), 1e-6f);
 }
 
-/// A plane of three by three tiles, all probes in a line of depths as on a floor seen at a grazing angle.
+/// A floor seen at a grazing angle: rows side by side on the screen are far apart.
 gather::ProbeAtlas grazing_atlas() {
-    gather::ProbeAtlas atlas;
-    atlas.resolution = 4;
-    atlas.spacing = 16;
-    atlas.tiles_x = 3;
-    atlas.tiles_y = 3;
-    for (int y = 0; y < 3; ++y) {
-        for (int x = 0; x < 3; ++x) {
-            gather::Probe probe;
-            probe.pixel = {16 * x + 8, 16 * y + 8};
-            probe.position = {0.1f * static_cast<float>(x), 0.0f, -2.0f * static_cast<float>(y)};
-            probe.normal = kUp;
-            probe.depth = 2.0f;
-            atlas.probes.push_back(probe);
-        }
+    return tests::constant_atlas(4, {0.1f, 0, 0}, {0, 0, -2.0f}, kUp);
+}
+
+/// Directional albedo of the specular lobe of a metal.
+double sampled_albedo(const core::Brdf& metal, const glm::vec3& outgoing) {
+    double albedo = 0.0;
+    constexpr std::uint32_t kCount = 1u << 14;
+    for (std::uint32_t i = 0; i < kCount; ++i) {
+        const core::BrdfSample chosen =
+            core::sample(metal, outgoing, 0.5f, core::SampleSequence(3, i).point(0));
+        if (!(chosen.pdf > 0.0f)) continue;
+        albedo += static_cast<double>(chosen.value.specular.x * chosen.incoming.z / chosen.pdf) / kCount;
     }
-    atlas.allocate_texels();
-    return atlas;
+    return albedo;
 }
 
 TEST(ProbeInterpolation, OnAGrazingSurfaceNearerProbesCountMore) {
     const gather::ProbeAtlas atlas = grazing_atlas();
     // Half-way on the screen between the rows; in the world much nearer to the first.
-    const gather::ProbeReader reader{{24.0f, 16.0f}, {0.1f, 0.0f, -0.1f}, kUp, 2.0f, 0.1f};
+    const gather::ProbeReader reader{{21.0f, 17.0f}, {0.1f, 0.0f, -0.1f}, kUp, 2.0f, 0.1f};
     const gather::ProbeWeights weights = gather::find_probes(atlas, reader, 1e4f);
     float first_row = 0.0f;
     for (std::size_t i = 0; i < weights.count; ++i) {
@@ -77,13 +75,9 @@ TEST(ProbeInterpolation, OnAGrazingSurfaceNearerProbesCountMore) {
 }
 
 TEST(NearField, ATexelThatEndsNearTakesWhatItsNeighboursSeeBeyond) {
-    gather::ProbeAtlas atlas = grazing_atlas();
-    for (std::size_t p = 0; p < atlas.probes.size(); ++p) {
-        atlas.probes[p].position = {0.1f * static_cast<float>(p % 3), 0.0f, 0.1f * static_cast<float>(p / 3)};
-    }
+    gather::ProbeAtlas atlas = tests::constant_atlas(4, {0.1f, 0, 0}, {0, 0, 0.1f}, kUp);
     for (glm::vec3& value : atlas.radiance) value = glm::vec3(2.0f);
     for (float& distance : atlas.hit_distance) distance = 10.0f;
-    for (std::uint8_t& count : atlas.ray_count) count = 1;
     const std::size_t texels = atlas.texel_count();
     atlas.radiance[4 * texels + 3] = glm::vec3(1000.0f);
     atlas.hit_distance[4 * texels + 3] = 1e-3f;
@@ -103,8 +97,7 @@ TEST(NearField, ATexelThatEndsNearTakesWhatItsNeighboursSeeBeyond) {
 
 /// Probes that hold 1 everywhere: a lobe sends back its directional albedo, sampled here with other numbers.
 TEST(IntegrateSpecular, ConstantProbesGiveTheDirectionalAlbedo) {
-    gather::ProbeAtlas atlas = grazing_atlas();
-    for (glm::vec3& value : atlas.radiance) value = glm::vec3(1.0f);
+    const gather::ProbeAtlas atlas = grazing_atlas();
     gather::VisibleSurfaces visible;
     visible.resize(1, 1);
     visible.depth[0] = 2.0f;
@@ -132,15 +125,7 @@ TEST(IntegrateSpecular, ConstantProbesGiveTheDirectionalAlbedo) {
             gather::integrate_specular({visible, atlas, table, {}, settings, 1, frame}, {weights}, true,
                                        specular);
         }
-        double albedo = 0.0;
-        constexpr std::uint32_t kCount = 1u << 14;
-        for (std::uint32_t i = 0; i < kCount; ++i) {
-            const core::BrdfSample chosen =
-                core::sample(point.brdf, point.frame.to_local(visible.outgoing[0]), 0.5f,
-                             core::SampleSequence(3, i).point(0));
-            if (!(chosen.pdf > 0.0f)) continue;
-            albedo += static_cast<double>(chosen.value.specular.x * chosen.incoming.z / chosen.pdf) / kCount;
-        }
+        const double albedo = sampled_albedo(point.brdf, point.frame.to_local(visible.outgoing[0]));
         EXPECT_NEAR(static_cast<double>(specular[0].x) / kFrames / albedo, 1.0, 0.01);
     }
 }
@@ -167,18 +152,12 @@ TEST(HitLighting, LobeRaysAndLightSamplingAddUpOnASmoothMetal) {
         EXPECT_EQ(gather::mirrors_lights(surface), roughness <= 0.5f);
         const glm::vec3 outgoing = glm::normalize(glm::vec3(0.3f, 1.0f, 0.2f));
         double sum = 0.0;
-        double albedo = 0.0;
         constexpr std::uint32_t kCount = 1u << 14;
         for (std::uint32_t i = 0; i < kCount; ++i) {
             const core::SampleSequence sequence(7, i);
             const auto light = gather::sample_light(lighting, lighting.sampled(), surface, glm::vec3(0.0f),
                                                     outgoing, sequence.point(0).x, sequence.point(1), 0);
             if (light) sum += static_cast<double>(light->specular.x);
-            const core::BrdfSample chosen =
-                core::sample_specular(surface.brdf, surface.frame.to_local(outgoing), sequence.point(4));
-            if (chosen.pdf > 0.0f) {
-                albedo += static_cast<double>(chosen.value.specular.x * chosen.incoming.z / chosen.pdf);
-            }
             if (!gather::mirrors_lights(surface)) continue;
             const auto lobe = gather::sample_lobe(lighting.sampled(), surface, glm::vec3(0.0f), outgoing,
                                                   sequence.point(2).x, sequence.point(3), 0);
@@ -187,6 +166,7 @@ TEST(HitLighting, LobeRaysAndLightSamplingAddUpOnASmoothMetal) {
                 scene, tracer, lighting.sampled(), {&*lobe, 1},
                 [&](std::size_t, const glm::vec3& value) { sum += static_cast<double>(value.x); });
         }
+        const double albedo = kCount * sampled_albedo(surface.brdf, surface.frame.to_local(outgoing));
         EXPECT_NEAR(sum / albedo, 1.0, 0.02);
     }
 }

@@ -13,30 +13,13 @@
 #include "gather/screen_probes/importance.h"
 #include "gather/screen_probes/interpolation.h"
 #include "gather/screen_probes/probe_atlas.h"
+#include "tests/gather/constant_atlas.h"
 
 namespace {
 
-/// A row of probes on the plane z = 0, all of whose texels hold 1.
+/// Probes on the plane z = 0, a tenth apart.
 gather::ProbeAtlas constant_atlas(int resolution) {
-    gather::ProbeAtlas atlas;
-    atlas.resolution = resolution;
-    atlas.spacing = 16;
-    atlas.tiles_x = 3;
-    atlas.tiles_y = 3;
-    for (int y = 0; y < 3; ++y) {
-        for (int x = 0; x < 3; ++x) {
-            gather::Probe probe;
-            probe.pixel = {16 * x + 5, 16 * y + 9};
-            probe.position = {0.1f * static_cast<float>(x), 0.1f * static_cast<float>(y), 0.0f};
-            probe.depth = 2.0f;
-            atlas.probes.push_back(probe);
-        }
-    }
-    atlas.allocate_texels();
-    for (glm::vec3& value : atlas.radiance) value = glm::vec3(1.0f);
-    for (float& distance : atlas.hit_distance) distance = 1.0f;
-    for (std::uint8_t& count : atlas.ray_count) count = 1;
-    return atlas;
+    return tests::constant_atlas(resolution, {0.1f, 0, 0}, {0, 0.1f, 0}, {0, 0, 1});
 }
 
 glm::vec3 random_direction(std::mt19937& random) {

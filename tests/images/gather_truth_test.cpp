@@ -9,8 +9,7 @@
 #include "core/render/path_tracer.h"
 #include "core/scene/scene_loader.h"
 #include "core/support/parallel.h"
-#include "core/trace/triangle_tracer.h"
-#include "gather/final_gather.h"
+#include "tests/support/gather_pictures.h"
 #include "tests/support/render_scenes.h"
 #include "tests/support/shared_data.h"
 
@@ -19,28 +18,15 @@ namespace {
 constexpr int kWidth = 48;
 constexpr int kHeight = 36;
 
-core::Scene asset(const std::string& name) {
-    return core::load_scene_file(tests::assets_folder() / (name + ".glb"), {});
-}
-
 core::Frame gathered(const core::Scene& scene, const core::Camera& camera, const gather::Settings& settings,
                      std::uint64_t seed, const char* effects = "auto", int width = kWidth,
                      int height = kHeight) {
-    const core::TriangleTracer tracer(scene);
-    const std::set<std::string> layers = {"Direct", "IndirectDiffuse", "IndirectSpecular", "Normal"};
-    gather::FinalGather renderer(
-        settings, gather::make_plan(scene, width, height, settings, gather::parse_effects(effects), layers));
-    return renderer.render({.scene = scene,
-                            .camera = camera,
-                            .tracer = tracer,
-                            .primary = tracer,
-                            .width = width,
-                            .height = height,
-                            .crop = {},
-                            .seed = seed,
-                            .aovs = layers,
-                            .progress = {},
-                            .stop_requested = {}});
+    return tests::gather_picture(scene, camera, settings, effects,
+                                 {.width = width,
+                                  .height = height,
+                                  .seed = seed,
+                                  .aovs = {"Direct", "IndirectDiffuse", "IndirectSpecular", "Normal"}})
+        .frame;
 }
 
 /// gather.md: dense probes, many directions, and nothing that approximates.
@@ -134,7 +120,7 @@ struct TruthCase {
 class GatherTruth : public testing::TestWithParam<TruthCase> {};
 
 TEST_P(GatherTruth, CrankedUpItIsThePathTracer) {
-    const core::Scene scene = asset(GetParam().scene);
+    const core::Scene scene = tests::asset(GetParam().scene);
     const core::Camera& camera = scene.cameras.front();
     const Mean mine = gathered_mean(scene, camera, truth_mode());
     const Mean truth = truth_of(scene, camera, 1024);
@@ -153,14 +139,12 @@ INSTANTIATE_TEST_SUITE_P(Diffuse, GatherTruth,
                          [](const auto& c) { return std::string(c.param.scene); });
 
 TEST(GatherSplit, NothingSampledAndEverythingSampledAreOnePicture) {
-    const core::Scene box = asset("cornell_box");
-    core::Scene sky = asset("instances");
+    const core::Scene box = tests::asset("cornell_box");
+    core::Scene sky = tests::asset("instances");
     sky.lights.clear();
     sky.sky = core::Sky::constant(glm::vec3(1.0f, 2.0f, 3.0f));
     for (const core::Scene* scene : {&box, static_cast<const core::Scene*>(&sky)}) {
-        const core::Camera camera = scene->cameras.empty()
-                                        ? core::framing(core::world_bounds(*scene), 4.0 / 3.0)
-                                        : scene->cameras.front();
+        const core::Camera camera = tests::camera_of(*scene);
         gather::Settings settings = truth_mode();
         settings.frames = 8;
         settings.lighting.direct_samples = 4;
@@ -176,7 +160,7 @@ TEST(GatherSplit, NothingSampledAndEverythingSampledAreOnePicture) {
 
 /// Without the lamp on its own side the dark corridor is black: whatever is seen there came through a wall.
 TEST(GatherLeak, ThinWallsLetNothingThrough) {
-    core::Scene scene = asset("thin_walls");
+    core::Scene scene = tests::asset("thin_walls");
     const core::Camera dark = scene.cameras.at(0);
     const core::Camera bright = scene.cameras.at(1);
     for (core::Material& material : scene.materials) {
@@ -195,13 +179,6 @@ TEST(GatherLeak, ThinWallsLetNothingThrough) {
     EXPECT_NEAR(lit / truth, 1.0, 0.02);
 }
 
-void expect_same(const core::Image& a, const core::Image& b) {
-    ASSERT_EQ(a.channels().size(), b.channels().size());
-    for (std::size_t i = 0; i < a.channels().size(); ++i) {
-        EXPECT_EQ(a.channels()[i].values, b.channels()[i].values) << a.channels()[i].name;
-    }
-}
-
 TEST(GatherScenes, EveryRealSceneIsFiniteAndAutoEqualsAll) {
     FIELDLIGHT_NEED_SHARED(folder, "scenes");
     int count = 0;
@@ -214,14 +191,12 @@ TEST(GatherScenes, EveryRealSceneIsFiniteAndAutoEqualsAll) {
             SCOPED_TRACE(file.path());
             core::Scene scene = core::load_scene_file(file.path(), {});
             scene.sky = core::Sky::constant(glm::vec3(0.5f, 0.7f, 1.0f));
-            const core::Camera camera = scene.cameras.empty()
-                                            ? core::framing(core::world_bounds(scene), 4.0 / 3.0)
-                                            : scene.cameras.front();
+            const core::Camera camera = tests::camera_of(scene);
             gather::Settings settings;
             settings.frames = 2;
             const core::Frame automatic = gathered(scene, camera, settings, 1, "auto");
             EXPECT_EQ(core::count_nonfinite(automatic.image), 0u);
-            expect_same(automatic.image, gathered(scene, camera, settings, 1, "all").image);
+            tests::expect_same_bits(automatic.image, gathered(scene, camera, settings, 1, "all").image);
             ++count;
         }
     }
@@ -239,7 +214,7 @@ TEST(GatherScenes, ARealSceneIsTheSameAtAnyThreadCount) {
     for (const int threads : {1, 2, 3, 8}) {
         core::with_thread_limit(threads, [&] {
             const core::Frame frame = gathered(scene, camera, settings, 1, "auto", 160, 120);
-            if (first) expect_same(frame.image, first->image);
+            if (first) tests::expect_same_bits(frame.image, first->image);
             first = frame;
         });
     }
