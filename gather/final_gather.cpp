@@ -14,11 +14,13 @@
 #include "gather/effect_costs.h"
 #include "gather/integrate/bent_normal.h"
 #include "gather/integrate/integrate.h"
+#include "gather/lighting/outlines.h"
 #include "gather/lighting/scene_lighting.h"
 #include "gather/lighting/visible_surfaces.h"
 #include "gather/screen_probes/filtering.h"
 #include "gather/screen_probes/near_field.h"
 #include "gather/screen_probes/placement.h"
+#include "gather/screen_probes/probe_visibility.h"
 #include "gather/screen_probes/tracing.h"
 #include "gather/temporal/accumulation.h"
 
@@ -71,6 +73,8 @@ public:
                         settings.bounces > 0 && !lighting_.everything().empty(),
                         settings.lighting.hit_roughness_min),
           table_(settings.screen_probes.resolution),
+          outlines_(inputs.width, inputs.height,
+                    plan.on(Effect::kTemporal) ? settings.film.outline_samples : 1),
           accumulation_(inputs.width, inputs.height, inputs.aovs),
           ledger_(inputs.stop_requested) {}
 
@@ -80,7 +84,12 @@ public:
         const std::size_t pixels =
             static_cast<std::size_t>(inputs_.width) * static_cast<std::size_t>(inputs_.height);
         direct_.assign(pixels, glm::vec3(0.0f));
-        ledger_.time("primary", [&] { return find_visible_surfaces(inputs_, lighting_, frame, visible_); });
+        ledger_.time("primary", [&] {
+            return find_visible_surfaces(inputs_, lighting_, outlines_.film_indices(), visible_);
+        });
+        if (outlines_.wanted()) {
+            ledger_.time("outlines", [&] { return outlines_.sample(inputs_, lighting_, visible_); });
+        }
         if (lighting_.samples_anything()) {
             ledger_.time("direct", [&] {
                 return add_direct_light(inputs_, lighting_, visible_,
@@ -100,6 +109,8 @@ public:
 private:
     void gather_light(std::uint32_t frame);
     void remember_openness(std::uint32_t frame);
+    FramePixel frame_pixel(std::size_t pixel) const;
+    FramePixel outline_pixel(const OutlineSample& sample) const;
     void accumulate();
     void add_probe_layers(core::Image& image) const;
 
@@ -109,6 +120,7 @@ private:
     SceneLighting lighting_;
     HitLighting hit_lighting_;
     TexelTable table_;
+    Outlines outlines_;
     Accumulation accumulation_;
     Ledger ledger_;
 
@@ -171,6 +183,10 @@ void Picture::gather_light(std::uint32_t frame) {
         interpolate_probes(in, weights_);
         return PassRays{};
     });
+    if (probes.probe_visibility && probes.spacing > 1) {
+        ledger_.time("probe_visibility",
+                     [&] { return hide_probes(inputs_, visible_, atlas_, openness_, weights_); });
+    }
     if (bent) {
         BentNormalRays rays;
         ledger_.time("bent_normal", [&] {
@@ -202,30 +218,51 @@ void Picture::remember_openness(std::uint32_t frame) {
     }
 }
 
+FramePixel Picture::frame_pixel(std::size_t pixel) const {
+    FramePixel value;
+    value.direct = visible_.emitted[pixel] + direct_[pixel];
+    value.steps = static_cast<float>(visible_.steps[pixel]);
+    if (!visible_.surface(pixel)) return value;
+    const core::SurfacePoint& point = visible_.points[pixel];
+    value.surface = true;
+    value.depth = visible_.depth[pixel];
+    value.distance = visible_.distance[pixel];
+    value.normal = point.frame.normal;
+    value.albedo = core::approximate_albedo(point.brdf);
+    value.bent_normal = bent_.empty() ? point.frame.normal : bent_[pixel].direction;
+    if (plan_.on(Effect::kScreenProbes)) {
+        value.indirect_diffuse = diffuse_[pixel];
+        value.indirect_specular = specular_[pixel];
+        value.probe_support = weights_[pixel].support;
+    }
+    return value;
+}
+
+FramePixel Picture::outline_pixel(const OutlineSample& sample) const {
+    FramePixel value;
+    if (sample.source != OutlineSample::kSky) {
+        value = frame_pixel(sample.source);
+        value.direct = sample.tint * direct_[sample.source];
+        value.indirect_diffuse *= sample.tint;
+        value.indirect_specular *= sample.tint;
+        value.albedo *= sample.tint;
+    }
+    value.direct += sample.emitted;
+    value.steps = static_cast<float>(sample.steps);
+    return value;
+}
+
 void Picture::accumulate() {
-    const bool gathered = plan_.on(Effect::kScreenProbes);
     core::parallel_for(visible_.depth.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t pixel = begin; pixel < end; ++pixel) {
-            FramePixel value;
-            value.direct = visible_.emitted[pixel] + direct_[pixel];
-            value.steps = static_cast<float>(visible_.steps[pixel]);
-            if (visible_.surface(pixel)) {
-                const core::SurfacePoint& point = visible_.points[pixel];
-                value.surface = true;
-                value.depth = visible_.depth[pixel];
-                value.distance = visible_.distance[pixel];
-                value.normal = point.frame.normal;
-                value.albedo = core::approximate_albedo(point.brdf);
-                value.bent_normal = bent_.empty() ? point.frame.normal : bent_[pixel].direction;
-                if (gathered) {
-                    value.indirect_diffuse = diffuse_[pixel];
-                    value.indirect_specular = specular_[pixel];
-                    value.probe_support = weights_[pixel].support;
-                }
-            }
-            accumulation_.add(pixel, value);
+        for (std::size_t pixel = begin; pixel < end; ++pixel) accumulation_.add(pixel, frame_pixel(pixel));
+    });
+    outlines_.for_pixels([&](std::span<const OutlineSample> samples) {
+        for (const OutlineSample& sample : samples) {
+            if (sample.source != OutlineSample::kUnlit)
+                accumulation_.add(sample.pixel, outline_pixel(sample));
         }
     });
+    outlines_.end_frame(visible_);
 }
 
 void Picture::add_probe_layers(core::Image& image) const {
@@ -273,7 +310,7 @@ core::Image crop_image(const core::Image& image, const core::Crop& crop) {
 
 core::Frame Picture::finish(int frame_count) {
     core::Frame frame;
-    frame.image = accumulation_.develop(plan_.on(Effect::kTemporal) ? frame_count : 1);
+    frame.image = accumulation_.develop();
     add_probe_layers(frame.image);
     if (inputs_.crop.width > 0) frame.image = crop_image(frame.image, inputs_.crop);
     frame.passes = ledger_.passes();
@@ -304,6 +341,7 @@ std::uint64_t FinalGather::picture_bytes(int width, int height, const Settings& 
     Plan everything;
     for (PlannedEffect& effect : everything.effects) effect.on = true;
     return probe_cache_bytes(everything, width, height, settings) + Accumulation::bytes(width, height, aovs) +
+           Outlines::bytes(width, height, settings.film.outline_samples) +
            pixels * (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + sizeof(NearLight) + sizeof(float) +
                      sizeof(ProbeWeights) + sizeof(BentNormal));
 }

@@ -84,6 +84,9 @@ const std::vector<Knob>& knobs() {
     constexpr auto kP = &Settings::screen_probes;
     constexpr auto kI = &Settings::integrate;
     static const std::vector<Knob> table = {
+        number("film.outline_samples", &Settings::film, &FilmSettings::outline_samples, 1, 64,
+               "of the film a frame, in pixels that an outline crosses; all but one take their light beside "
+               "them"),
         choice("lighting.sampled_emitters", kL, &L::sampled_emitters,
                {{"auto", SampledEmitters::kAuto},
                 {"none", SampledEmitters::kNone},
@@ -117,6 +120,8 @@ const std::vector<Knob>& knobs() {
                "k in exp2(-k (plane distance / depth)^2)"),
         flag("screen_probes.jitter_interpolation", kP, &P::jitter_interpolation,
              "moves a pixel within its plane before it reads its probes"),
+        flag("screen_probes.probe_visibility", kP, &P::probe_visibility,
+             "asks by short rays whether something hides a probe from the pixel that reads it"),
         flag("screen_probes.importance_sampling", kP, &P::importance_sampling,
              "moves rays from where the BRDF is small; needs the filter"),
         number("screen_probes.cull_threshold", kP, &P::cull_threshold, 0.0f, 1.0f,
@@ -182,6 +187,7 @@ Settings quality_settings(std::string_view quality) {
     if (quality == "medium") return settings;
     if (quality == "draft") {
         settings.frames = 4;
+        settings.film.outline_samples = 1;
         settings.lighting.direct_samples = 1;
         settings.screen_probes.jitter_interpolation = true;  // Few frames show the grid otherwise.
         settings.screen_probes.adaptive_budget = 0.25f;
@@ -192,7 +198,6 @@ Settings quality_settings(std::string_view quality) {
         settings.frames = ultra ? 64 : 32;
         settings.screen_probes.spacing = 8;
         settings.screen_probes.resolution = ultra ? 16 : 8;
-        settings.screen_probes.adaptive_budget = 1.0f;
         settings.integrate.specular_directions = ultra ? 8 : 4;
         settings.integrate.bent_normal_rays = ultra ? 8 : 4;
     } else {

@@ -27,16 +27,21 @@ struct LightingSettings {
     int direct_samples = 4;  ///< Lights that a pixel samples a frame. 1 ... 64.
 };
 
+struct FilmSettings {
+    int outline_samples = 4;  ///< Of the film, a frame, in pixels that an outline crosses. 1 ... 64.
+};
+
 struct ScreenProbeSettings {
     int spacing = 16;                   ///< Pixels between uniform probes; a power of two from 1 to 32.
     int resolution = 8;                 ///< Texels along an edge of a probe's octahedral map: 4, 8, 16 or 32.
     bool jitter_placement = true;       ///< Moves the grid of probes from frame to frame.
     bool jitter_directions = true;      ///< Moves the rays within their texels from frame to frame.
     bool adaptive = true;               ///< Places further probes where interpolation fails.
-    float adaptive_budget = 0.5f;       ///< Most adaptive probes, as a share of the uniform ones. 0 ... 4.
+    float adaptive_budget = 1.0f;       ///< Most adaptive probes, as a share of the uniform ones. 0 ... 4.
     float adaptive_threshold = 0.1f;    ///< Interpolation fails where the plane weights sum to less. 0 ... 1.
     float plane_sharpness = 1e5f;       ///< k in exp2(-k (plane distance / depth)^2). 0 ... 1e8.
     bool jitter_interpolation = false;  ///< Moves a pixel within its plane before it reads its probes.
+    bool probe_visibility = true;       ///< Does not read probes that something hides from the pixel.
     bool importance_sampling = true;    ///< Moves rays from where the BRDF is under `cull_threshold`.
     float cull_threshold = 0.1f;        ///< Of the BRDF, whose peak is about 1. 0 ... 1.
     bool lighting_pdf = true;           ///< Guides rays by the light that the last frame found.
@@ -79,6 +84,7 @@ struct TemporalSettings {
 struct Settings {
     int frames = 16;  ///< Accumulated. At least 1.
     int bounces = 1;  ///< Indirect bounces: 0 or 1, until surfaces are cached.
+    FilmSettings film;
     LightingSettings lighting;
     ScreenProbeSettings screen_probes;
     IntegrateSettings integrate;

@@ -16,6 +16,10 @@ namespace {
 
 enum Dimension : std::uint32_t { kDirection, kAlpha };
 
+/// How many frames must have found a pixel open for it to count as open, and how open.
+constexpr std::uint32_t kFramesToTrust = 2;
+constexpr float kOpen = 0.999f;
+
 /// Short rays of some rows of pixels, side by side.
 struct ShortRays {
     core::RayStream rays;
@@ -45,8 +49,9 @@ public:
           frame_(frame),
           rays_a_pixel_(static_cast<std::uint32_t>(settings.bent_normal_rays)) {}
 
+    std::uint32_t rays_of(std::size_t pixel, const NearLighting* near) const;
     void trace(std::size_t first, std::size_t last, const NearLighting* near, ShortRays& out) const;
-    void bend(const ShortRays& in, std::vector<BentNormal>& result) const;
+    void bend(const ShortRays& in, const NearLighting* near, std::vector<BentNormal>& result) const;
     void shade(const NearLighting& near, const ShortRays& in, std::vector<NearLight>& result,
                HitLightingCounters& counters) const;
 
@@ -57,6 +62,13 @@ private:
     std::uint32_t frame_;
     std::uint32_t rays_a_pixel_;
 };
+
+/// A pixel whose rays of some frames found all open takes one from then on, until it finds something.
+std::uint32_t BentNormalPass::rays_of(std::size_t pixel, const NearLighting* near) const {
+    const bool open =
+        near && frame_ >= kFramesToTrust && near->openness[pixel] >= kOpen && near->weights[pixel].confident;
+    return open ? 1 : rays_a_pixel_;
+}
 
 /// Of the pixels from `first` up to `last`.
 void BentNormalPass::trace(std::size_t first, std::size_t last, const NearLighting* near,
@@ -74,7 +86,8 @@ void BentNormalPass::trace(std::size_t first, std::size_t last, const NearLighti
         const float length = settings_.bent_normal_pixels * visible_.footprint.at(visible_.depth[pixel]);
         const std::uint32_t key = pixel_key(inputs_.seed, static_cast<int>(pixel % width),
                                             static_cast<int>(pixel / width), kBentNormalUse);
-        for (std::uint32_t k = 0; k < rays_a_pixel_; ++k) {
+        const std::uint32_t ray_count = rays_of(pixel, near);
+        for (std::uint32_t k = 0; k < ray_count; ++k) {
             const core::SampleSequence sequence(key, frame_ * rays_a_pixel_ + k);
             core::Ray ray;
             ray.origin = visible_.origins[pixel];
@@ -104,8 +117,8 @@ void BentNormalPass::trace(std::size_t first, std::size_t last, const NearLighti
     }
 }
 
-void BentNormalPass::bend(const ShortRays& in, std::vector<BentNormal>& result) const {
-    const float share = 1.0f / static_cast<float>(rays_a_pixel_);
+void BentNormalPass::bend(const ShortRays& in, const NearLighting* near,
+                          std::vector<BentNormal>& result) const {
     for (std::size_t i = 0; i < in.pixels.size();) {
         const std::size_t pixel = in.pixels[i];
         glm::vec3 blocked(0.0f);
@@ -116,6 +129,7 @@ void BentNormalPass::bend(const ShortRays& in, std::vector<BentNormal>& result) 
             blocked += in.rays.get(i).direction;
         }
         if (blocked_count == 0) continue;
+        const float share = 1.0f / static_cast<float>(rays_of(pixel, near));
         // The mean of the cosine-weighted hemisphere is 2/3 n; taking the blocked part off it leaves the
         // open part's, exactly n where nothing is blocked.
         const glm::vec3& normal = visible_.points[pixel].frame.normal;
@@ -142,7 +156,6 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
         found.keys.push_back(in.keys[i]);
     }
     counters = near.hit_lighting.shade(found.rays, found.hits, found.keys, frame_, found.radiance);
-    const float share = core::kPi / static_cast<float>(rays_a_pixel_);
     std::size_t shaded = 0;
     for (std::size_t i = 0; i < in.pixels.size(); ++i) {
         const std::size_t pixel = in.pixels[i];
@@ -158,6 +171,7 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
                 held += weights.weight[k] * near.atlas.read(weights.probe[k], at);
             }
         }
+        const float share = core::kPi / static_cast<float>(rays_of(pixel, &near));
         light.irradiance += share * ((has_own ? own : held) - light.probe_share * held);
     }
 }
@@ -192,7 +206,7 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
         const auto width = static_cast<std::size_t>(visible.width);
         ShortRays found;
         pass.trace(begin * width, end * width, near, found);
-        pass.bend(found, result);
+        pass.bend(found, near, result);
         HitLightingCounters counters;
         if (near) pass.shade(*near, found, near_light, counters);
         short_rays += found.pixels.size();

@@ -40,9 +40,17 @@ std::uint32_t pixel_key(std::uint64_t seed, int x, int y, std::uint32_t use) {
                             static_cast<std::uint32_t>(y) * 0x10001u + static_cast<std::uint32_t>(x), use);
 }
 
-PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
-                               std::uint32_t frame, VisibleSurfaces& result) {
+core::Ray film_ray(const core::RenderInputs& inputs, const core::CameraRays& camera, int x, int y,
+                   std::uint32_t film_index) {
     enum Dimension : std::uint32_t { kFilm, kAlpha };
+    const core::SampleSequence sequence(pixel_key(inputs.seed, x, y, kCameraUse), film_index);
+    core::Ray ray = camera.ray(glm::vec2(x, y) + sequence.point(kFilm));
+    ray.seed = sequence.bits(kAlpha);
+    return ray;
+}
+
+PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                               const std::vector<std::uint32_t>& film_indices, VisibleSurfaces& result) {
     result.resize(inputs.width, inputs.height);
     const core::CameraRays camera(inputs.camera, inputs.width, inputs.height);
     result.footprint = PixelFootprint(camera, inputs.width, inputs.height);
@@ -58,10 +66,7 @@ PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLigh
             for (std::size_t i = 0; i < rays.size(); ++i) {
                 const int x = static_cast<int>((first + i) % static_cast<std::size_t>(inputs.width));
                 const int y = static_cast<int>((first + i) / static_cast<std::size_t>(inputs.width));
-                const core::SampleSequence sequence(pixel_key(inputs.seed, x, y, kCameraUse), frame);
-                core::Ray ray = camera.ray(glm::vec2(x, y) + sequence.point(kFilm));
-                ray.seed = sequence.bits(kAlpha);
-                rays.set(i, ray);
+                rays.set(i, film_ray(inputs, camera, x, y, film_indices[first + i]));
             }
             inputs.primary.trace_closest(rays, hits);
             std::uint64_t lost = 0;

@@ -56,11 +56,22 @@ struct PassRays {
 
 /// The key of a pixel's random numbers; `use` names the pass, so that dropping a pass shifts nothing.
 std::uint32_t pixel_key(std::uint64_t seed, int x, int y, std::uint32_t use);
-enum PixelUse : std::uint32_t { kCameraUse, kDirectUse, kInterpolationUse, kSpecularUse, kBentNormalUse };
+enum PixelUse : std::uint32_t {
+    kCameraUse,
+    kDirectUse,
+    kInterpolationUse,
+    kSpecularUse,
+    kBentNormalUse,
+    kVisibilityUse
+};
 
-/// Camera rays of `frame`, jittered within their pixels.
+/// The camera ray through the sample of a pixel's film that has this index in its sequence.
+core::Ray film_ray(const core::RenderInputs& inputs, const core::CameraRays& camera, int x, int y,
+                   std::uint32_t film_index);
+
+/// One camera ray a pixel. @param film_indices by pixel, of its sample
 PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
-                               std::uint32_t frame, VisibleSurfaces& result);
+                               const std::vector<std::uint32_t>& film_indices, VisibleSurfaces& result);
 
 /// Adds the light of S to each pixel, `samples` lights each by a shadow ray.
 PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting& lighting,

@@ -31,6 +31,7 @@ void Accumulation::add(std::size_t pixel, const FramePixel& value) {
     sum.direct += value.direct;
     sum.indirect_diffuse += value.indirect_diffuse;
     sum.indirect_specular += value.indirect_specular;
+    sum.count += 1.0f;
     if (value.surface) sum.surface_count += 1.0f;
     if (!auxiliary_) return;
     AuxiliarySum& more = auxiliary_sums_[pixel];
@@ -44,25 +45,24 @@ void Accumulation::add(std::size_t pixel, const FramePixel& value) {
     more.probe_support += value.probe_support;
 }
 
-core::Image Accumulation::develop(int frame_count) const {
+core::Image Accumulation::develop() const {
     core::Image image(width_, height_);
-    const float scale = 1.0f / static_cast<float>(frame_count);
     const std::size_t count = sums_.size();
     std::vector<glm::vec3> colors(count);
     const auto add_color = [&](const char* layer, const auto& color) {
-        for (std::size_t i = 0; i < count; ++i) colors[i] = color(sums_[i]) * scale;
+        for (std::size_t i = 0; i < count; ++i) colors[i] = color(sums_[i]) / sums_[i].count;
         image.add_color(layer, colors);
     };
     // Differences of near light may leave a mean below 0 by their noise; frames are never clamped.
     const auto diffuse = [](const Sum& s) { return glm::max(s.indirect_diffuse, glm::vec3(0.0f)); };
     add_color("", [&](const Sum& s) { return s.direct + diffuse(s) + s.indirect_specular; });
     std::vector<float>& alpha = image.add_channel("A");
-    for (std::size_t i = 0; i < count; ++i) alpha[i] = sums_[i].surface_count * scale;
+    for (std::size_t i = 0; i < count; ++i) alpha[i] = sums_[i].surface_count / sums_[i].count;
     if (layers_.count("Direct")) add_color("Direct", [](const Sum& s) { return s.direct; });
     if (layers_.count("IndirectDiffuse")) add_color("IndirectDiffuse", diffuse);
     if (layers_.count("IndirectSpecular"))
         add_color("IndirectSpecular", [](const Sum& s) { return s.indirect_specular; });
-    // Means over the frames in which the pixel saw a surface.
+    // Means over the samples that saw a surface.
     const auto share = [&](std::size_t i) {
         return sums_[i].surface_count > 0.0f ? 1.0f / sums_[i].surface_count : 0.0f;
     };
@@ -88,7 +88,7 @@ core::Image Accumulation::develop(int frame_count) const {
     add_number("ProbeWeight", "ProbeWeight.Y", &AuxiliarySum::probe_support);
     if (layers_.count("Steps")) {
         std::vector<float>& values = image.add_channel("Steps.Y");
-        for (std::size_t i = 0; i < count; ++i) values[i] = auxiliary_sums_[i].steps * scale;
+        for (std::size_t i = 0; i < count; ++i) values[i] = auxiliary_sums_[i].steps / sums_[i].count;
     }
     return image;
 }

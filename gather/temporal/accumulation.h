@@ -10,7 +10,7 @@
 
 namespace gather {
 
-/// One pixel of one frame.
+/// One sample of a pixel in one frame.
 struct FramePixel {
     glm::vec3 direct{0.0f};  ///< Emission seen directly included.
     glm::vec3 indirect_diffuse{0.0f};
@@ -25,7 +25,8 @@ struct FramePixel {
     float steps = 0.0f;  ///< Valid for misses too.
 };
 
-/// Sums frames, and divides by their number. A still camera's history is the sum itself: no tap is rejected.
+/// Sums samples over the frames, and divides by their number. A still camera's history is the sum itself: no
+/// tap is rejected.
 /// Distinct pixels may be added to from distinct threads.
 class Accumulation {
 public:
@@ -34,18 +35,18 @@ public:
     /// Forgets all frames: the picture is what follows.
     void clear();
 
-    /// Adds one pixel of the frame under way.
+    /// Adds a sample of the frame under way to its pixel.
     void add(std::size_t pixel, const FramePixel& value);
 
-    /// The mean of `frame_count` frames, with the layers asked for. @pre frame_count > 0
-    core::Image develop(int frame_count) const;
+    /// The mean of each pixel's samples, with the layers asked for. @pre every pixel has a sample
+    core::Image develop() const;
 
     static std::uint64_t bytes(int width, int height, const std::set<std::string>& layers);
 
 private:
     struct Sum {
         glm::vec3 direct{0.0f}, indirect_diffuse{0.0f}, indirect_specular{0.0f};
-        float surface_count = 0.0f;
+        float count = 0.0f, surface_count = 0.0f;
     };
     struct AuxiliarySum {
         glm::vec3 normal{0.0f}, albedo{0.0f}, bent_normal{0.0f};

@@ -1,0 +1,68 @@
+// gather/lighting/outlines.h: more samples of the film where an outline crosses a pixel.
+//
+// A frame shades one sample a pixel, so that few frames leave outlines ragged. Pixels in which an earlier
+// frame found an outline take further camera rays. Those cost no lighting: each takes the light of the
+// nearest sample of this frame beside it on the same surface, and its own emission or sky. Which pixels take
+// them depends on earlier frames alone: a sample that chose its own company would weigh itself wrongly.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "core/render/renderer.h"
+#include "gather/lighting/scene_lighting.h"
+#include "gather/lighting/visible_surfaces.h"
+
+namespace gather {
+
+/// A further sample of a pixel's film.
+struct OutlineSample {
+    std::uint32_t pixel = 0;
+    std::uint32_t source = kSky;  ///< The pixel whose light it takes, or one of:
+    glm::vec3 tint{1.0f};         ///< Its albedo over the source's.
+    glm::vec3 emitted{0.0f};      ///< As VisibleSurfaces::emitted.
+    std::uint32_t steps = 0;
+
+    static constexpr std::uint32_t kSky = 0xffffffffu;    ///< No surface.
+    static constexpr std::uint32_t kUnlit = 0xfffffffeu;  ///< No sample stands for it: it does not count.
+};
+
+/// The samples of the film of all pixels over the frames of a picture.
+class Outlines {
+public:
+    /// @param samples a pixel takes a frame where an outline crosses it, its first one included; 1: none
+    Outlines(int width, int height, int samples);
+
+    /// By pixel, the index of the frame's first sample in the sequence of its film.
+    const std::vector<std::uint32_t>& film_indices() const { return film_indices_; }
+
+    /// Whether pixels may take further samples.
+    bool wanted() const { return further_ > 0; }
+
+    /// Takes the further samples of this frame, those of a pixel in a row.
+    PassRays sample(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                    const VisibleSurfaces& visible);
+
+    /// Calls `body` with the further samples of some pixels, from several threads; each pixel's in one call.
+    void for_pixels(const std::function<void(std::span<const OutlineSample>)>& body) const;
+
+    /// Looks for outlines in this frame, for those that follow.
+    void end_frame(const VisibleSurfaces& visible);
+
+    static std::uint64_t bytes(int width, int height, int samples);
+
+private:
+    std::uint32_t further_;  ///< Samples beside the first.
+    std::vector<std::uint32_t> film_indices_;
+    std::vector<std::uint8_t> marks_;
+    std::vector<std::uint32_t> pixels_;  ///< Those that are marked, in order.
+    std::vector<OutlineSample> samples_;
+};
+
+/// Whether an outline runs between two pixels: of a surface, between surfaces, or of what emits.
+bool is_outline(const VisibleSurfaces& visible, std::size_t a, std::size_t b);
+
+}  // namespace gather
