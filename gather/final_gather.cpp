@@ -205,7 +205,7 @@ void Picture::gather_light(std::uint32_t frame) {
         diffuse_.assign(visible_.depth.size(), glm::vec3(0.0f));
         specular_.assign(visible_.depth.size(), glm::vec3(0.0f));
         integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_light_, diffuse_);
-        integrate_specular(in, weights_, directional, specular_);
+        integrate_specular(in, weights_, directional, near_light_, specular_);
         return PassRays{};
     });
 }

@@ -172,11 +172,24 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
             }
         }
         const float share = core::kPi / static_cast<float>(rays_of(pixel, &near));
-        light.irradiance += share * ((has_own ? own : held) - light.probe_share * held);
+        const glm::vec3 change = share * ((has_own ? own : held) - light.probe_share * held);
+        light.irradiance += change;
+        const core::SurfacePoint& point = visible_.points[pixel];
+        if (change != glm::vec3(0.0f) && reflects_near_light(point)) {
+            light.specular +=
+                change * core::evaluate(point.brdf, point.frame.to_local(visible_.outgoing[pixel]),
+                                        point.frame.to_local(in.rays.get(i).direction))
+                             .value.specular;
+        }
     }
 }
 
 }  // namespace
+
+bool reflects_near_light(const core::SurfacePoint& surface) {
+    constexpr float kLeastAlpha = 0.36f;  // Roughness 0.6.
+    return surface.brdf.alpha >= kLeastAlpha && core::has_specular(surface.brdf);
+}
 
 BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
                                   const IntegrateSettings& settings, std::uint32_t frame,

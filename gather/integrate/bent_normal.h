@@ -45,8 +45,12 @@ struct NearLighting {
 /// hardly seen, their noise would be that of subtracting it.
 struct NearLight {
     glm::vec3 irradiance{0.0f};  ///< Of either sign.
+    glm::vec3 specular{0.0f};    ///< Likewise, as radiance: of surfaces that reflects_near_light().
     float probe_share = 1.0f;
 };
+
+/// Whether the specular lobe is wide enough for rays that follow the cosine: smoother ones would speckle.
+bool reflects_near_light(const core::SurfacePoint& surface);
 
 struct BentNormalRays {
     std::uint64_t short_rays = 0;

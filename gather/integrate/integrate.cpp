@@ -10,6 +10,7 @@
 #include "core/math/sampling.h"
 #include "core/support/parallel.h"
 #include "gather/integrate/reflectance.h"
+#include "gather/integrate/rough_lobe.h"
 
 namespace gather {
 
@@ -52,6 +53,32 @@ glm::vec3 irradiance(const IntegrateInputs& in, const ProbeWeights& weights, con
         glm::vec3 one(0.0f);
         for (std::size_t t = 0; t < texels.size(); ++t) one += cosine_weights[t] * texels[t];
         sum += weights.weight[i] * one;
+    }
+    return sum;
+}
+
+/// Radiance that the specular lobe of a rough surface sends to the eye.
+glm::vec3 rough_reflection(const IntegrateInputs& in, const ProbeWeights& weights,
+                           const core::SurfacePoint& point, const glm::vec3& outgoing) {
+    if (in.settings.diffuse == DiffuseIntegral::kSh) {
+        const core::ShColor lobe = rough_lobe(point, outgoing);
+        const core::ShColor light = mix_sh(in.atlas, weights);
+        glm::vec3 sum(0.0f);
+        for (std::size_t k = 0; k < core::kShCount; ++k) sum += lobe[k] * light[k];
+        return glm::max(glm::vec3(0.0f), sum);
+    }
+    const glm::vec3 local_outgoing = point.frame.to_local(outgoing);
+    const float solid_angle = 4.0f * core::kPi / static_cast<float>(in.atlas.texel_count());
+    glm::vec3 sum(0.0f);
+    for (std::size_t t = 0; t < in.atlas.texel_count(); ++t) {
+        const glm::vec3 incoming = point.frame.to_local(in.table.centers()[t]);
+        if (!(incoming.z > 0.0f)) continue;
+        glm::vec3 light(0.0f);
+        for (std::size_t i = 0; i < weights.count; ++i) {
+            light += weights.weight[i] * in.atlas.radiance_of(weights.probe[i])[t];
+        }
+        sum += core::evaluate(point.brdf, local_outgoing, incoming).value.specular *
+               (incoming.z * solid_angle) * light;
     }
     return sum;
 }
@@ -121,20 +148,22 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
 }
 
 void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights, bool directional,
-                        std::vector<glm::vec3>& specular) {
+                        const std::vector<NearLight>& near_light, std::vector<glm::vec3>& specular) {
     const VisibleSurfaces& visible = in.visible;
     const auto width = static_cast<std::size_t>(visible.width);
     const auto samples = static_cast<std::uint32_t>(in.settings.specular_directions);
     core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
-        std::vector<float> cosine_weights;
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
             if (!visible.surface(pixel)) continue;
             const core::SurfacePoint& point = visible.points[pixel];
             if (!core::has_specular(point.brdf)) continue;
             const glm::vec3 outgoing = point.frame.to_local(visible.outgoing[pixel]);
+            const NearLight near =
+                near_light.empty() || !reflects_near_light(point) ? NearLight{} : near_light[pixel];
+            specular[pixel] += near.specular;
             if (!directional || point.roughness > in.settings.rough_specular_max) {
-                specular[pixel] += specular_albedo(point.brdf, outgoing.z) / core::kPi *
-                                   irradiance(in, weights[pixel], point.frame.normal, cosine_weights);
+                specular[pixel] +=
+                    near.probe_share * rough_reflection(in, weights[pixel], point, visible.outgoing[pixel]);
                 continue;
             }
             const std::uint32_t key = pixel_key(in.seed, static_cast<int>(pixel % width),
@@ -151,7 +180,7 @@ void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeight
                                                       core::octahedral_from_direction(direction));
                 sum += chosen.value.specular * (chosen.incoming.z / chosen.pdf) * light;
             }
-            specular[pixel] += sum / static_cast<float>(samples);
+            specular[pixel] += near.probe_share * sum / static_cast<float>(samples);
         }
     });
 }

@@ -33,8 +33,9 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
                        std::vector<glm::vec3>& diffuse);
 
 /// Light of the specular lobe. Surfaces smoother than settings.rough_specular_max reflect the probes in
-/// visible-normal GGX directions where `directional`; all others E / pi times the lobe's albedo.
+/// visible-normal GGX directions where `directional`; all others through rough_lobe(). @param near_light may
+/// be empty
 void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights, bool directional,
-                        std::vector<glm::vec3>& specular);
+                        const std::vector<NearLight>& near_light, std::vector<glm::vec3>& specular);
 
 }  // namespace gather

@@ -47,13 +47,4 @@ glm::vec3 diffuse_albedo(const core::Brdf& brdf, float cosine) {
     return brdf.diffuse * (1.0f - (brightest + (brdf.dielectric_f90 - brightest) * mean));
 }
 
-glm::vec3 specular_albedo(const core::Brdf& brdf, float cosine) {
-    const float roughness = std::sqrt(brdf.alpha);
-    const glm::vec4 r =
-        roughness * glm::vec4(-1.0f, -0.0275f, -0.572f, 0.022f) + glm::vec4(1.0f, 0.0425f, 1.04f, -0.04f);
-    const float a004 = std::min(r.x * r.x, std::exp2(-9.28f * cosine)) * r.x + r.y;
-    const glm::vec2 scale_bias = glm::vec2(-1.04f, 1.04f) * a004 + glm::vec2(r.z, r.w);
-    return glm::max(glm::vec3(0.0f), brdf.f0 * scale_bias.x + brdf.f90 * scale_bias.y);
-}
-
 }  // namespace gather

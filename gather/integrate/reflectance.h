@@ -1,4 +1,5 @@
-// gather/integrate/reflectance.h: how much of a constant environment each lobe of a surface sends to the eye.
+// gather/integrate/reflectance.h: how much of a constant environment the diffuse lobe of a surface sends to
+// the eye.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -10,8 +11,5 @@ namespace gather {
 /// Directional albedo of the diffuse lobe: what the coat's Fresnel term leaves of brdf.diffuse, exact for the
 /// BRDF of core/scene/brdf. @param cosine of the view direction, in (0, 1]
 glm::vec3 diffuse_albedo(const core::Brdf& brdf, float cosine);
-
-/// Directional albedo of the specular lobe, by the fit of Karis, "Physically Based Shading on Mobile", 2014.
-glm::vec3 specular_albedo(const core::Brdf& brdf, float cosine);
 
 }  // namespace gather
