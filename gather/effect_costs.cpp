@@ -34,6 +34,8 @@ std::vector<std::string_view> passes_of(Effect effect) {
             return {"filter_probes"};
         case Effect::kRoughSpecular:
             return {"integrate"};
+        case Effect::kReflections:
+            return {"reflections", "reflection_shadows"};
         case Effect::kBentNormal:
             return {"near_field", "bent_normal", "bent_normal_shadows", "integrate"};
         case Effect::kTemporal:

@@ -14,6 +14,7 @@
 #include "gather/effect_costs.h"
 #include "gather/integrate/bent_normal.h"
 #include "gather/integrate/integrate.h"
+#include "gather/integrate/reflections.h"
 #include "gather/lighting/outlines.h"
 #include "gather/lighting/scene_lighting.h"
 #include "gather/lighting/visible_surfaces.h"
@@ -72,6 +73,8 @@ public:
           hit_lighting_(inputs.scene, inputs.tracer, lighting_,
                         settings.bounces > 0 && !lighting_.everything().empty(),
                         settings.lighting.hit_roughness_min),
+          mirrored_lighting_(inputs.scene, inputs.tracer, lighting_,
+                             settings.bounces > 0 && !lighting_.everything().empty(), 0.0f),
           table_(settings.screen_probes.resolution),
           outlines_(inputs.width, inputs.height,
                     plan.on(Effect::kTemporal) ? settings.film.outline_samples : 1),
@@ -108,6 +111,7 @@ public:
 
 private:
     void gather_light(std::uint32_t frame);
+    void trace_smooth(std::uint32_t frame);
     void remember_openness(std::uint32_t frame);
     FramePixel frame_pixel(std::size_t pixel) const;
     FramePixel outline_pixel(const OutlineSample& sample) const;
@@ -119,6 +123,7 @@ private:
     const Plan& plan_;
     SceneLighting lighting_;
     HitLighting hit_lighting_;
+    HitLighting mirrored_lighting_;  ///< As sharp as it is: such rays stand for one pixel, not for a probe's.
     TexelTable table_;
     Outlines outlines_;
     Accumulation accumulation_;
@@ -205,9 +210,21 @@ void Picture::gather_light(std::uint32_t frame) {
         diffuse_.assign(visible_.depth.size(), glm::vec3(0.0f));
         specular_.assign(visible_.depth.size(), glm::vec3(0.0f));
         integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_light_, diffuse_);
-        integrate_specular(in, weights_, directional, near_light_, specular_);
+        integrate_specular(in, weights_, {directional, plan_.on(Effect::kReflections)}, near_light_,
+                           specular_);
         return PassRays{};
     });
+    if (plan_.on(Effect::kReflections)) trace_smooth(frame);
+}
+
+void Picture::trace_smooth(std::uint32_t frame) {
+    ReflectionRays rays;
+    ledger_.time("reflections", [&] {
+        rays =
+            trace_reflections(inputs_, visible_, mirrored_lighting_, settings_.integrate, frame, specular_);
+        return PassRays{rays.rays, rays.exhausted};
+    });
+    ledger_.time("reflection_shadows", [&] { return PassRays{rays.shadow_rays, 0}; });
 }
 
 void Picture::remember_openness(std::uint32_t frame) {

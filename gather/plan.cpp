@@ -27,6 +27,7 @@ constexpr std::array<std::string_view, kEffectCount> kNames = {"punctual_lights"
                                                                "lighting_pdf",
                                                                "spatial_filter",
                                                                "rough_specular",
+                                                               "reflections",
                                                                "bent_normal",
                                                                "temporal"};
 
@@ -40,6 +41,7 @@ struct SceneFacts {
     int blend_parts = 0;
     int reflecting_parts = 0;  ///< Not unlit: light that arrives may leave.
     int smooth_parts = 0;      ///< Parts with a specular lobe that may be smoother than the threshold.
+    int mirror_parts = 0;      ///< Likewise, smooth enough for rays of their own.
     int specular_parts = 0;
 };
 
@@ -69,6 +71,7 @@ SceneFacts find_facts(const core::Scene& scene, const Settings& settings) {
             if (!core::has_specular(material)) continue;
             ++facts.specular_parts;
             if (may_be_smoother(material, settings.integrate.rough_specular_max)) ++facts.smooth_parts;
+            if (may_be_smoother(material, settings.integrate.reflection_roughness_max)) ++facts.mirror_parts;
         }
         if (emissive) ++facts.emissive_instances;
     }
@@ -217,6 +220,16 @@ Plan Planner::make() {
                    ? std::string("every material is purely diffuse")
                    : fmt::format("every material is rougher than {}", settings_.integrate.rough_specular_max),
                fmt::format("{} directions a pixel", settings_.integrate.specular_directions));
+    }
+    if (!depends(Effect::kReflections, settings_.integrate.reflections, "integrate.reflections")) {
+        decide(Effect::kReflections, facts_.mirror_parts > 0,
+               fmt::format("{} may be smoother than {}", counted(facts_.mirror_parts, "part"),
+                           settings_.integrate.reflection_roughness_max),
+               facts_.specular_parts == 0 ? std::string("every material is purely diffuse")
+                                          : fmt::format("every material is rougher than {}",
+                                                        settings_.integrate.reflection_roughness_max),
+               fmt::format("{} of such a pixel, with its shadow rays",
+                           counted(settings_.integrate.reflection_rays, "ray")));
     }
     if (!depends(Effect::kBentNormal, settings_.integrate.bent_normal, "integrate.bent_normal")) {
         decide(Effect::kBentNormal, true, "probes stand too far apart for contact shadows", "",

@@ -27,10 +27,11 @@ enum class Effect {
     kLightingPdf,
     kSpatialFilter,
     kRoughSpecular,
+    kReflections,
     kBentNormal,
     kTemporal,
 };
-inline constexpr std::size_t kEffectCount = 13;
+inline constexpr std::size_t kEffectCount = 14;
 
 /// As `--effects` spells it: `punctual_lights`, `sky`, ...
 std::string_view name_of(Effect effect);

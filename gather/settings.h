@@ -67,12 +67,15 @@ enum class NearField {
 
 struct IntegrateSettings {
     DiffuseIntegral diffuse = DiffuseIntegral::kSh;
-    bool rough_specular = true;   ///< Reflects the probes in GGX directions; off: E / pi times the albedo.
-    int specular_directions = 2;  ///< A pixel a frame. 1 ... 64.
-    float rough_specular_max = 0.8f;   ///< Rougher surfaces reflect E / pi. 0 ... 1.
-    bool bent_normal = true;           ///< Short rays at full resolution restore contact shadows.
-    int bent_normal_rays = 4;          ///< A pixel a frame. 1 ... 64.
-    float bent_normal_pixels = 16.0f;  ///< Length of those rays on the screen. 1 ... 64.
+    bool rough_specular = true;       ///< Reflects the probes in GGX directions; off: by harmonics.
+    int specular_directions = 2;      ///< A pixel a frame. 1 ... 64.
+    float rough_specular_max = 0.8f;  ///< Rougher ones reflect by harmonics. 0 ... 1.
+    bool reflections = true;          ///< Smooth surfaces take rays of their own; off: they blur the probes.
+    float reflection_roughness_max = 0.5f;  ///< Rougher ones reflect the probes. 0 ... 1.
+    int reflection_rays = 1;                ///< A pixel of them a frame. 1 ... 64.
+    bool bent_normal = true;                ///< Short rays at full resolution restore contact shadows.
+    int bent_normal_rays = 4;               ///< A pixel a frame. 1 ... 64.
+    float bent_normal_pixels = 16.0f;       ///< Length of those rays on the screen. 1 ... 64.
     NearField near_field = NearField::kTraced;
     float near_field_albedo_max = 0.5f;  ///< Caps the albedo in the multi-bounce estimate. 0 ... 1.
 };

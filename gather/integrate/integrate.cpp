@@ -10,6 +10,7 @@
 #include "core/math/sampling.h"
 #include "core/support/parallel.h"
 #include "gather/integrate/reflectance.h"
+#include "gather/integrate/reflections.h"
 #include "gather/integrate/rough_lobe.h"
 
 namespace gather {
@@ -147,8 +148,9 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
     });
 }
 
-void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights, bool directional,
-                        const std::vector<NearLight>& near_light, std::vector<glm::vec3>& specular) {
+void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
+                        const SpecularModes& modes, const std::vector<NearLight>& near_light,
+                        std::vector<glm::vec3>& specular) {
     const VisibleSurfaces& visible = in.visible;
     const auto width = static_cast<std::size_t>(visible.width);
     const auto samples = static_cast<std::uint32_t>(in.settings.specular_directions);
@@ -157,11 +159,12 @@ void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeight
             if (!visible.surface(pixel)) continue;
             const core::SurfacePoint& point = visible.points[pixel];
             if (!core::has_specular(point.brdf)) continue;
+            if (modes.reflections && takes_reflection_rays(point, in.settings)) continue;
             const glm::vec3 outgoing = point.frame.to_local(visible.outgoing[pixel]);
             const NearLight near =
                 near_light.empty() || !reflects_near_light(point) ? NearLight{} : near_light[pixel];
             specular[pixel] += near.specular;
-            if (!directional || point.roughness > in.settings.rough_specular_max) {
+            if (!modes.directional || point.roughness > in.settings.rough_specular_max) {
                 specular[pixel] +=
                     near.probe_share * rough_reflection(in, weights[pixel], point, visible.outgoing[pixel]);
                 continue;

@@ -32,10 +32,16 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
                        const std::vector<BentNormal>& bent, const std::vector<NearLight>& near_light,
                        std::vector<glm::vec3>& diffuse);
 
-/// Light of the specular lobe. Surfaces smoother than settings.rough_specular_max reflect the probes in
-/// visible-normal GGX directions where `directional`; all others through rough_lobe(). @param near_light may
-/// be empty
-void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights, bool directional,
-                        const std::vector<NearLight>& near_light, std::vector<glm::vec3>& specular);
+struct SpecularModes {
+    bool directional = false;  ///< Surfaces up to settings.rough_specular_max reflect in GGX directions.
+    bool reflections = false;  ///< Those that takes_reflection_rays() are left to them.
+};
+
+/// Light that the specular lobe finds in the probes: in visible-normal GGX directions, or through
+/// rough_lobe().
+/// @param near_light may be empty
+void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
+                        const SpecularModes& modes, const std::vector<NearLight>& near_light,
+                        std::vector<glm::vec3>& specular);
 
 }  // namespace gather

@@ -10,9 +10,9 @@ namespace gather {
 
 namespace {
 
-constexpr int kRoughnessSteps = 16;
+constexpr int kRoughnessSteps = 8;
 constexpr int kCosineSteps = 16;
-constexpr int kQuadrature = 24;
+constexpr int kQuadrature = 64;
 
 /// The functions that a lobe mirrored at the plane of x and z leaves: 1; z, x; 3z^2 - 1, xz, x^2 - y^2.
 constexpr std::array<std::size_t, 6> kEven = {0, 2, 3, 6, 7, 8};
@@ -55,16 +55,17 @@ public:
     LobeTable() {
         for (int r = 0; r <= kRoughnessSteps; ++r) {
             for (int c = 0; c <= kCosineSteps; ++c) {
-                const float cosine = std::max(static_cast<float>(c) / kCosineSteps, 1e-3f);
+                const float root = static_cast<float>(c) / kCosineSteps;
+                const float cosine = std::max(root * root, 1e-3f);
                 lobes_[index(r, c)] = project(static_cast<float>(r) / kRoughnessSteps, cosine);
             }
         }
     }
 
-    /// Bilinear.
+    /// Bilinear in roughness and the cosine's root: lobes change fastest at grazing angles.
     Lobe at(float roughness, float cosine) const {
         const float r = std::clamp(roughness, 0.0f, 1.0f) * kRoughnessSteps;
-        const float c = std::clamp(cosine, 0.0f, 1.0f) * kCosineSteps;
+        const float c = std::sqrt(std::clamp(cosine, 0.0f, 1.0f)) * kCosineSteps;
         const int r0 = std::min(static_cast<int>(r), kRoughnessSteps - 1);
         const int c0 = std::min(static_cast<int>(c), kCosineSteps - 1);
         Lobe result;

@@ -62,7 +62,8 @@ enum PixelUse : std::uint32_t {
     kInterpolationUse,
     kSpecularUse,
     kBentNormalUse,
-    kVisibilityUse
+    kVisibilityUse,
+    kReflectionUse
 };
 
 /// The camera ray through the sample of a pixel's film that has this index in its sequence.

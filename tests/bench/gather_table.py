@@ -26,7 +26,7 @@ from shared_scenes import scene_files
 TRUTH = {"screen_probes__spacing": 1, "screen_probes__resolution": 16, "screen_probes__importance_sampling": "off",
          "screen_probes__spatial_filter": "off", "screen_probes__jitter_interpolation": "off",
          "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16,
-         "lighting__hit_roughness_min": 0}
+         "lighting__hit_roughness_min": 0, "film__outline_samples": 1}
 LEDGER = {
     "SH3": {"integrate__diffuse": "sh"},
     "filter": {"screen_probes__spatial_filter": "on"},
@@ -35,13 +35,16 @@ LEDGER = {
     "bent normal, multi-bounce": {"integrate__bent_normal": "on", "integrate__near_field": "multi_bounce"},
     "jittered interpolation": {"screen_probes__jitter_interpolation": "on"},
     "intensity clamp, 100 cd/m^2": {"screen_probes__max_ray_intensity": 100},
+    "outlines": {"film__outline_samples": 4},
     "spacing 16": {"screen_probes__spacing": 16},
     "resolution 8": {"screen_probes__resolution": 8},
 }
 TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "screen_probes__lighting_pdf",
               "screen_probes__spatial_filter", "screen_probes__clamp_hit_distance", "integrate__bent_normal",
               "screen_probes__jitter_placement", "screen_probes__jitter_directions",
-              "screen_probes__jitter_interpolation", "temporal__accumulate", "integrate__rough_specular"]
+              "screen_probes__jitter_interpolation", "temporal__accumulate", "integrate__rough_specular",
+              "screen_probes__probe_visibility", "integrate__reflections", "film__outline_samples"]
+OFF = {"film__outline_samples": 1}  # What is not a switch.
 PROBE_PASSES = ("place_probes", "near_field", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
 
 
@@ -63,6 +66,7 @@ PROOF = {
     "lighting_pdf": (DARK_SCENE, "assets/two_rooms.glb", 4, []),
     "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
     "rough_specular": ("assets/cornell_box.glb", "shared:scenes/suzanne/Suzanne.gltf", 8, ["--sky=1,1,1"]),
+    "reflections": ("assets/cornell_box.glb", "assets/glossy.glb", 8, []),
     "bent_normal": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
     "temporal": ("assets/thin_walls.glb", "assets/thin_walls.glb", 8, []),
 }
@@ -100,6 +104,7 @@ def budget(run, options):
         rows.append([view["name"], f"{seconds:.2f}", f"{rays(stats, 'trace_probes'):.2f}",
                      f"{rays(stats, 'direct', 'probe_shadows'):.2f}",
                      f"{rays(stats, 'bent_normal', 'bent_normal_shadows'):.2f}",
+                     f"{rays(stats, 'outlines', 'probe_visibility', 'reflections', 'reflection_shadows'):.2f}",
                      f"{error:.3g}, {mine['flip']:.3f}, {mine['energy_bias']:+.2f} %",
                      f"{path_error:.3g}, {its['flip']:.3f}, {its['energy_bias']:+.2f} %", f"{ratio:.2f}",
                      f"{flip_ratio:.2f}", f"{wall:.2f}", f"{wall_ratio:.2f}"])
@@ -112,7 +117,8 @@ def budget(run, options):
     mean = geometric_mean([record["ratio"] for record in records if record["diffuse"]])
     if mean < 10:
         failed.append(f"diffuse scenes: relMSE is lower by {mean:.2f}x in the geometric mean, not 10x")
-    text = table(["scene", "seconds", "probe rays", "shadow rays", "bent-normal rays a pixel a frame",
+    text = table(["scene", "seconds", "probe rays", "shadow rays", "bent-normal rays",
+                  "other rays a pixel a frame, besides the first one",
                   "gather: relMSE, FLIP, bias", "path: relMSE, FLIP, bias", "relMSE ratio", "FLIP ratio",
                   "wall seconds", "relMSE ratio at these"], rows)
     return text + f"\n\nAt {options.size}. Geometric mean over the diffuse scenes: {mean:.2f}", records, failed
@@ -145,7 +151,7 @@ def ablation(run, options):
     for view in load_views(options):
         reference = run.reference(view)
         for name in ["nothing"] + TECHNIQUES:
-            flags, frames = ([] if name == "nothing" else setting(**{name: "off"})), options.frames
+            flags, frames = ([] if name == "nothing" else setting(**{name: OFF.get(name, "off")})), options.frames
             picture, stats = run.gather(view, *flags)
             if name == "nothing":
                 whole = rays(stats, "trace_probes")

@@ -137,7 +137,7 @@ TEST(Program, EffectsThatAreOffCostNothing) {
          {"", "--accumulate 1", "--effects emissive_sampling", "--set screen_probes.spatial_filter=off"}) {
         SCOPED_TRACE(flags);
         const nlohmann::json statistics = render_with(folder, std::string("--quality draft ") + flags);
-        EXPECT_EQ(statistics["effects"].size(), 13u);
+        EXPECT_EQ(statistics["effects"].size(), 14u);
         for (const auto& [name, effect] : statistics["effects"].items()) {
             if (effect["on"].get<bool>()) continue;
             EXPECT_EQ(effect["seconds"].get<double>(), 0.0) << name;

@@ -122,8 +122,8 @@ TEST(IntegrateSpecular, ConstantProbesGiveTheDirectionalAlbedo) {
         std::vector<glm::vec3> specular(1, glm::vec3(0.0f));
         constexpr std::uint32_t kFrames = 64;
         for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
-            gather::integrate_specular({visible, atlas, table, {}, settings, 1, frame}, {weights}, true,
-                                       specular);
+            gather::integrate_specular({visible, atlas, table, {}, settings, 1, frame}, {weights},
+                                       {.directional = true}, {}, specular);
         }
         const double albedo = sampled_albedo(point.brdf, point.frame.to_local(visible.outgoing[0]));
         EXPECT_NEAR(static_cast<double>(specular[0].x) / kFrames / albedo, 1.0, 0.01);

@@ -33,6 +33,7 @@ core::Frame gathered(const core::Scene& scene, const core::Camera& camera, const
 gather::Settings truth_mode() {
     gather::Settings settings;
     settings.frames = 16;
+    settings.film.outline_samples = 1;
     settings.lighting.direct_samples = 16;
     settings.lighting.hit_roughness_min = 0.0f;
     settings.screen_probes.spacing = 1;

@@ -1,0 +1,222 @@
+// Light at full resolution: probes behind things, rough lobes as harmonics, mirrors, outlines.
+#include "gather/integrate/integrate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/math/sampling.h"
+#include "core/trace/triangle_tracer.h"
+#include "gather/integrate/rough_lobe.h"
+#include "gather/screen_probes/probe_visibility.h"
+#include "tests/gather/constant_atlas.h"
+#include "tests/support/analytic_scenes.h"
+#include "tests/support/gather_pictures.h"
+#include "tests/support/render_scenes.h"
+
+namespace {
+
+constexpr glm::vec3 kUp(0.0f, 1.0f, 0.0f);
+
+/// A pixel on the floor between probes 0.1 apart, and a wall beside it.
+class ProbeVisibility : public testing::Test {
+protected:
+    ProbeVisibility()
+        : scene_(tests::scene_of(tests::box({0.01f, 0.2f, 1.0f}), tests::translation({0.15, 0, 0}))),
+          tracer_(scene_),
+          atlas_(tests::constant_atlas(4, {0.1f, 0, 0}, {0, 0, 0.1f}, kUp)) {
+        visible_.resize(1, 1);
+        visible_.depth[0] = 2.0f;
+        core::SurfacePoint& point = visible_.points[0];
+        point.position = {0.1f, 0, 0.1f};  // As the probe in the middle; the wall stands before column 2.
+        point.geometric_normal = kUp;
+        weights_.resize(1);
+        weights_[0].count = 3;
+        weights_[0].probe = {3, 4, 5};
+        weights_[0].weight = {0.2f, 0.4f, 0.4f};
+    }
+
+    std::uint64_t hide(std::span<const float> openness) {
+        const core::Camera camera;
+        return gather::hide_probes({.scene = scene_,
+                                    .camera = camera,
+                                    .tracer = tracer_,
+                                    .primary = tracer_,
+                                    .width = 1,
+                                    .height = 1,
+                                    .crop = {},
+                                    .seed = 1,
+                                    .aovs = {},
+                                    .progress = {},
+                                    .stop_requested = {}},
+                                   visible_, atlas_, openness, weights_)
+            .rays;
+    }
+
+    core::Scene scene_;
+    core::TriangleTracer tracer_;
+    gather::ProbeAtlas atlas_;
+    gather::VisibleSurfaces visible_;
+    std::vector<gather::ProbeWeights> weights_;
+};
+
+TEST_F(ProbeVisibility, AProbeBehindAWallIsNotRead) {
+    EXPECT_GT(hide({}), 0u);
+    EXPECT_FLOAT_EQ(weights_[0].weight[0], 1.0f / 3.0f);
+    EXPECT_FLOAT_EQ(weights_[0].weight[1], 2.0f / 3.0f);
+    EXPECT_EQ(weights_[0].weight[2], 0.0f);
+    EXPECT_TRUE(weights_[0].confident);
+}
+
+TEST_F(ProbeVisibility, WhereAllAreHiddenTheyStayAndThePixelIsNotConfident) {
+    weights_[0].count = 1;
+    weights_[0].probe = {5};
+    weights_[0].weight = {1.0f};
+    hide({});
+    EXPECT_EQ(weights_[0].weight[0], 1.0f);
+    EXPECT_FALSE(weights_[0].confident);
+}
+
+TEST_F(ProbeVisibility, InTheOpenNoRayIsTraced) {
+    const float open = 1.0f;
+    EXPECT_EQ(hide({&open, 1}), 0u);
+    EXPECT_EQ(weights_[0].weight[2], 0.4f);
+}
+
+/// A metal seen at some angle, in a frame that no axis of the world helps.
+core::SurfacePoint rough_metal(float roughness) {
+    core::SurfacePoint point;
+    point.geometric_normal = glm::normalize(glm::vec3(0.3f, 0.8f, -0.5f));
+    point.frame = core::ShadingFrame::from_normal(point.geometric_normal);
+    point.roughness = roughness;
+    point.brdf = core::Brdf{};
+    point.brdf.diffuse = glm::vec3(0.0f);
+    point.brdf.f0 = {0.9f, 0.5f, 0.04f};
+    point.brdf.alpha = roughness * roughness;
+    return point;
+}
+
+/// Radiance of third order comes back through the lobe as brute force says.
+TEST(RoughLobe, ReflectsHarmonicsAsTheBrdfDoes) {
+    core::ShColor light{};
+    for (std::size_t k = 0; k < core::kShCount; ++k) {
+        light[k] = glm::vec3(k == 0 ? 4.0f : 0.7f - 0.15f * static_cast<float>(k));
+    }
+    for (const float roughness : {0.5f, 0.8f, 0.97f}) {
+        for (const float cosine : {0.15f, 0.55f, 0.99f}) {
+            SCOPED_TRACE(testing::Message() << roughness << " at " << cosine);
+            const core::SurfacePoint point = rough_metal(roughness);
+            const float sine = std::sqrt(1.0f - cosine * cosine);
+            const glm::vec3 local(0.6f * sine, 0.8f * sine, cosine);
+            const glm::vec3 outgoing = point.frame.to_world(local);
+            const core::ShColor lobe = gather::rough_lobe(point, outgoing);
+            glm::vec3 reflected(0.0f);
+            for (std::size_t k = 0; k < core::kShCount; ++k) reflected += lobe[k] * light[k];
+            glm::vec3 truth(0.0f);
+            constexpr std::uint32_t kCount = 1u << 15;
+            for (std::uint32_t i = 0; i < kCount; ++i) {
+                const glm::vec3 incoming =
+                    core::sample_cosine_hemisphere(core::SampleSequence(5, i).point(0));
+                const glm::vec3 radiance =
+                    core::sh_dot(light, core::sh_basis(point.frame.to_world(incoming)));
+                truth += core::evaluate(point.brdf, local, incoming).value.specular * radiance *
+                         (core::kPi / static_cast<float>(kCount));
+            }
+            for (int c = 0; c < 3; ++c) EXPECT_NEAR(reflected[c] / truth[c], 1.0f, 0.03f) << c;
+        }
+    }
+}
+
+double mean_square(const core::Image& a, const core::Image& b) {
+    return tests::mean_squared_error(a, b);
+}
+
+gather::Settings few_frames() {
+    gather::Settings settings;
+    settings.frames = 16;
+    return settings;
+}
+
+/// A wall of smooth metal shows the room: the path tracer's picture, which blurred probes do not give.
+TEST(Reflections, MirrorsShowWhatThePathTracerSees) {
+    core::Scene scene = tests::area_lit_room();
+    scene.instances.pop_back();  // The lamp, whose spot on the ceiling is all noise.
+    scene.lights.emplace_back(core::PointLight{"lamp", {0.0f, 0.3f, 0.7f}, glm::vec3(1.0f)});
+    for (core::Material& material : scene.materials) {
+        if (material.base_color.g < 2.0f * material.base_color.r) continue;
+        material.metallic = 1.0f;  // The green wall.
+        material.roughness = 0.15f;
+    }
+    const core::Camera camera = tests::room_camera();
+    const std::set<std::string> layers = {"IndirectSpecular"};
+    const core::Frame truth = tests::render(
+        scene, camera, {.width = 64, .height = 48, .samples_per_pixel = 1024, .bounces = 1, .aovs = layers});
+    gather::Settings settings = few_frames();
+    const auto reflected = [&](const core::Frame& frame) { return frame.image.find("IndirectSpecular.G"); };
+    const auto error = [&] {
+        const core::Frame frame =
+            tests::gather_picture(scene, camera, settings, "auto", {.aovs = layers}).frame;
+        double sum = 0.0;
+        double truth_sum = 0.0;
+        double squares = 0.0;
+        for (std::size_t i = 0; i < frame.image.pixel_count(); ++i) {
+            const auto a = static_cast<double>((*reflected(frame))[i]);
+            const auto b = static_cast<double>((*reflected(truth))[i]);
+            sum += a;
+            truth_sum += b;
+            squares += (a - b) * (a - b);
+        }
+        if (settings.integrate.reflections) {
+            EXPECT_NEAR(sum / truth_sum, 1.0, 0.01);
+        }
+        return squares;
+    };
+    const double traced = error();
+    settings.integrate.reflections = false;
+    EXPECT_LT(traced, 0.2 * error());
+}
+
+/// Coverage of a scene's outlines against many samples of the film.
+TEST(Outlines, FurtherSamplesOfTheFilmSmoothThemAndMoveNothing) {
+    core::Scene scene = tests::area_lit_room();
+    const core::Camera camera = tests::room_camera();
+    const core::Frame truth =
+        tests::render(scene, camera, {.width = 64, .height = 48, .samples_per_pixel = 4096, .bounces = 0});
+    double errors[2];
+    for (const int samples : {1, 4}) {
+        gather::Settings settings = few_frames();
+        settings.bounces = 0;
+        settings.lighting.direct_samples = 16;  // Outlines, and hardly any noise.
+        settings.film.outline_samples = samples;
+        double sum = 0.0;
+        double mean = 0.0;
+        for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+            const core::Frame frame =
+                tests::gather_picture(scene, camera, settings, "auto", {.seed = seed}).frame;
+            sum += mean_square(frame.image, truth.image);
+            mean += 0.25 * tests::mean_radiance(frame.image);
+        }
+        errors[samples == 1 ? 0 : 1] = sum;
+        EXPECT_NEAR(mean / tests::mean_radiance(truth.image), 1.0, 0.003) << samples;
+    }
+    EXPECT_LT(errors[1], 0.5 * errors[0]);
+}
+
+/// Pixels that no outline crosses take the same samples whether others take more or not.
+TEST(Outlines, PixelsElsewhereStayAsTheyAre) {
+    const core::Scene scene = tests::area_lit_room();
+    gather::Settings settings = few_frames();
+    settings.bounces = 0;
+    const core::Frame with = tests::gather_picture(scene, tests::room_camera(), settings, "auto").frame;
+    settings.film.outline_samples = 1;
+    const core::Frame without = tests::gather_picture(scene, tests::room_camera(), settings, "auto").frame;
+    const std::vector<float>& a = *with.image.find("G");
+    const std::vector<float>& b = *without.image.find("G");
+    std::size_t same = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) same += a[i] == b[i] ? 1 : 0;
+    EXPECT_GT(same, a.size() / 2);
+    EXPECT_LT(same, a.size());
+}
+
+}  // namespace
