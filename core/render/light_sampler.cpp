@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/image/image.h"
+#include "core/math/random.h"
 
 namespace core {
 
@@ -152,25 +153,32 @@ float LightSampler::group_probability(const Group& group, const LightReceiver& r
     return value > 0.0f ? selection.scale * value + selection.floor : 0.0f;
 }
 
-LightSampler::Sample LightSampler::sample(const LightReceiver& receiver, const Selection& selection,
-                                          float u_group, const glm::vec2& u) const {
-    if (!(selection.floor > 0.0f)) return {};
-    const Group* chosen = nullptr;
-    float probability = 0.0f;
+LightSampler::Choice LightSampler::choose(const LightReceiver& receiver, const Selection& selection,
+                                          float u_group) const {
+    Choice choice;
+    if (!(selection.floor > 0.0f)) return choice;
     float remaining = u_group;
     for (const Group& group : groups_) {
         const float p = group_probability(group, receiver, selection);
         if (!(p > 0.0f)) continue;
         // The last live group takes what rounding leaves over.
-        chosen = &group;
-        probability = p;
+        choice = {&group, p, std::min(remaining / p, kOneMinusEpsilon)};
         if (remaining < p) break;
         remaining -= p;
     }
-    if (!chosen) return {};
+    return choice;
+}
 
+LightSampler::Sample LightSampler::sample(const LightReceiver& receiver, const Selection& selection,
+                                          const glm::vec2& u) const {
+    const Choice choice = choose(receiver, selection, u.x);
+    return choice.group ? sample_group(choice, receiver, {choice.remainder, u.y}) : Sample{};
+}
+
+LightSampler::Sample LightSampler::sample_group(const Choice& choice, const LightReceiver& receiver,
+                                                const glm::vec2& u) const {
     Sample result;
-    switch (chosen->kind) {
+    switch (choice.group->kind) {
         case Kind::kSky: {
             const Sky::Sample sky = sky_->sample(u);
             result.direction = sky.direction;
@@ -180,7 +188,7 @@ LightSampler::Sample LightSampler::sample(const LightReceiver& receiver, const S
             break;
         }
         case Kind::kLight: {
-            const LightSample light = sample_light(scene_.lights[chosen->index], receiver.position, u);
+            const LightSample light = sample_light(scene_.lights[choice.group->index], receiver.position, u);
             result.direction = light.direction;
             result.distance = light.distance;
             result.radiance = light.radiance;
@@ -189,10 +197,10 @@ LightSampler::Sample LightSampler::sample(const LightReceiver& receiver, const S
             break;
         }
         case Kind::kEmitter:
-            result = sample_emitter(emitters_[chosen->index], receiver, u);
+            result = sample_emitter(emitters_[choice.group->index], receiver, u);
             break;
     }
-    result.pdf *= probability;
+    result.pdf *= choice.probability;
     return result;
 }
 

@@ -58,9 +58,9 @@ public:
     /// The probabilities of all groups as seen from `receiver`.
     Selection selection(const LightReceiver& receiver) const;
 
-    /// @param u_group chooses the group, `u` the place within it; all in [0, 1).
-    Sample sample(const LightReceiver& receiver, const Selection& selection, float u_group,
-                  const glm::vec2& u) const;
+    /// @param u in [0, 1): x chooses the group, and what that leaves of it the place within. So points that
+    /// are stratified in two dimensions stay so within each group.
+    Sample sample(const LightReceiver& receiver, const Selection& selection, const glm::vec2& u) const;
 
     /// Density with which sample() would have chosen the direction of a ray that hit an emissive triangle; 0
     /// for an instance that is not sampled.
@@ -106,6 +106,15 @@ private:
     };
 
     void add_emitter(std::uint32_t instance, bool sampled);
+    /// A group and its probability; null: none can send light. `remainder` is u_group stretched to [0, 1)
+    /// over the group's share.
+    struct Choice {
+        const Group* group = nullptr;
+        float probability = 0.0f;
+        float remainder = 0.0f;
+    };
+    Choice choose(const LightReceiver& receiver, const Selection& selection, float u_group) const;
+    Sample sample_group(const Choice& choice, const LightReceiver& receiver, const glm::vec2& u) const;
     float importance(const Group& group, const LightReceiver& receiver) const;
     float group_probability(const Group& group, const LightReceiver& receiver,
                             const Selection& selection) const;

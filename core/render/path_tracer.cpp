@@ -38,14 +38,7 @@ constexpr int kStratifiedVertices = 2;
 
 /// Sobol dimensions by use, so that leaving one out shifts no other.
 enum Dimension : std::uint32_t { kFilm, kAlpha, kFirstVertex };
-enum VertexDimension : std::uint32_t {
-    kChoices,
-    kLightPoint,
-    kDirection,
-    kRoulette,
-    kAlphaNext,
-    kAlphaShadow
-};
+enum VertexDimension : std::uint32_t { kLobe, kLight, kDirection, kRoulette, kAlphaNext, kAlphaShadow };
 constexpr std::uint32_t kDimensionsPerVertex = 8;
 
 enum Pass : std::size_t { kPrimary, kBounce, kShadow, kShade, kPassCount };
@@ -130,9 +123,9 @@ private:
     void shade_emission(Path& path, const glm::vec3& emission, const Ray& ray, const Hit& hit,
                         int vertex) const;
     void sample_lights(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface,
-                       const glm::vec3& outgoing, const glm::vec3& origin, int vertex, float u_group) const;
+                       const glm::vec3& outgoing, const glm::vec3& origin, int vertex) const;
     bool scatter(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface, const glm::vec3& outgoing,
-                 const glm::vec3& origin, int vertex, float u_lobe) const;
+                 const glm::vec3& origin, int vertex) const;
     void resolve_shadows(Wave& wave, int vertex) const;
     std::unique_ptr<Wave> take_wave();
     void give_back(std::unique_ptr<Wave> wave);
@@ -306,9 +299,8 @@ void Job::shade(Wave& wave, int vertex) const {
             surface.origin_above(change_of_tracer ? start_offsets_[surface.instance] : 0.0f);
         const glm::vec3 outgoing = surface.frame.to_local(-ray.direction);
         path.receiver = {origin, surface.geometric_normal};
-        const glm::vec2 choices = vertex_point(path, vertex, kChoices);
-        if (samples_lights()) sample_lights(wave, path_index, surface, outgoing, origin, vertex, choices.x);
-        if (scatter(wave, path_index, surface, outgoing, origin, vertex, choices.y)) {
+        if (samples_lights()) sample_lights(wave, path_index, surface, outgoing, origin, vertex);
+        if (scatter(wave, path_index, surface, outgoing, origin, vertex)) {
             wave.next_active.push_back(path_index);
         }
     }
@@ -338,11 +330,11 @@ void Job::shade_emission(Path& path, const glm::vec3& emission, const Ray& ray, 
 }
 
 void Job::sample_lights(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface,
-                        const glm::vec3& outgoing, const glm::vec3& origin, int vertex, float u_group) const {
+                        const glm::vec3& outgoing, const glm::vec3& origin, int vertex) const {
     Path& path = wave.paths[path_index];
     path.selection = lights_.selection(path.receiver);
     const LightSampler::Sample light =
-        lights_.sample(path.receiver, path.selection, u_group, vertex_point(path, vertex, kLightPoint));
+        lights_.sample(path.receiver, path.selection, vertex_point(path, vertex, kLight));
     if (!(light.pdf > 0.0f) || !any_positive(light.radiance) ||
         !(glm::dot(light.direction, surface.geometric_normal) > 0.0f)) {
         return;
@@ -370,10 +362,10 @@ void Job::sample_lights(Wave& wave, std::uint32_t path_index, const SurfacePoint
 }
 
 bool Job::scatter(Wave& wave, std::uint32_t path_index, const SurfacePoint& surface,
-                  const glm::vec3& outgoing, const glm::vec3& origin, int vertex, float u_lobe) const {
+                  const glm::vec3& outgoing, const glm::vec3& origin, int vertex) const {
     Path& path = wave.paths[path_index];
-    const BrdfSample scattered =
-        sample(surface.brdf, outgoing, u_lobe, vertex_point(path, vertex, kDirection));
+    const BrdfSample scattered = sample(surface.brdf, outgoing, vertex_point(path, vertex, kLobe).x,
+                                        vertex_point(path, vertex, kDirection));
     if (!(scattered.pdf > 0.0f)) return false;
     const glm::vec3 direction = glm::normalize(surface.frame.to_world(scattered.incoming));
     if (!(glm::dot(direction, surface.geometric_normal) > 0.0f)) return false;

@@ -141,12 +141,11 @@ int SceneLighting::direct_samples(int wanted) const {
 }
 
 std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::LightSampler& sampler,
+                                         const core::LightSampler::Selection& selection,
                                          const core::SurfacePoint& surface, const glm::vec3& origin,
-                                         const glm::vec3& outgoing, float u_light, const glm::vec2& u_point,
-                                         std::uint32_t seed) {
-    const core::LightReceiver receiver{origin, surface.geometric_normal};
+                                         const glm::vec3& outgoing, const glm::vec2& u, std::uint32_t seed) {
     const core::LightSampler::Sample light =
-        sampler.sample(receiver, sampler.selection(receiver), u_light, u_point);
+        sampler.sample(core::LightReceiver{origin, surface.geometric_normal}, selection, u);
     if (!(light.pdf > 0.0f) || !any_positive(light.radiance) ||
         !(glm::dot(light.direction, surface.geometric_normal) > 0.0f)) {
         return std::nullopt;
@@ -177,9 +176,10 @@ bool mirrors_lights(const core::SurfacePoint& surface) {
     return surface.roughness <= kMirrorRoughness && core::has_specular(surface.brdf);
 }
 
-std::optional<LobeRay> sample_lobe(const core::LightSampler& sampler, const core::SurfacePoint& surface,
-                                   const glm::vec3& origin, const glm::vec3& outgoing, float u_lobe,
-                                   const glm::vec2& u, std::uint32_t seed) {
+std::optional<LobeRay> sample_lobe(const core::LightSampler::Selection& selection,
+                                   const core::SurfacePoint& surface, const glm::vec3& origin,
+                                   const glm::vec3& outgoing, float u_lobe, const glm::vec2& u,
+                                   std::uint32_t seed) {
     LobeRay result;
     result.chosen = core::sample(surface.brdf, surface.frame.to_local(outgoing), u_lobe, u);
     if (!(result.chosen.pdf > 0.0f)) return std::nullopt;
@@ -188,7 +188,7 @@ std::optional<LobeRay> sample_lobe(const core::LightSampler& sampler, const core
     result.ray.origin = origin;
     result.ray.seed = seed;
     result.receiver = {origin, surface.geometric_normal};
-    result.selection = sampler.selection(result.receiver);
+    result.selection = selection;
     return result;
 }
 
@@ -212,7 +212,7 @@ std::uint64_t trace_lobes(const core::Scene& scene, const core::Tracer& tracer,
 HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::HitStream& hits,
                                        std::span<const std::uint32_t> keys, std::uint32_t frame,
                                        std::span<glm::vec3> radiance) const {
-    enum Dimension : std::uint32_t { kLight, kPoint, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
+    enum Dimension : std::uint32_t { kLight, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
     HitLightingCounters counters;
     core::RayStream shadow_rays;
     shadow_rays.resize(direct_ ? rays.size() : 0);
@@ -247,18 +247,19 @@ HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::
         if (bounced_) radiance[i] += bounced_(surface, -ray.direction);
         if (!direct_) continue;
         const core::SampleSequence sequence(keys[i], frame);
+        const glm::vec3 origin = surface.origin_above();
+        const core::LightSampler::Selection selection =
+            lighting_.everything().selection({origin, surface.geometric_normal});
         if (mirrors_lights(surface)) {
-            const auto lobe = sample_lobe(lighting_.everything(), surface, surface.origin_above(),
-                                          -ray.direction, sequence.point(kLobe).x,
+            const auto lobe = sample_lobe(selection, surface, origin, -ray.direction, sequence.point(kLobe).x,
                                           sequence.point(kLobeDirection), sequence.bits(kLobeAlpha));
             if (lobe) {
                 lobes.push_back(*lobe);
                 lobe_target.push_back(static_cast<std::uint32_t>(i));
             }
         }
-        const auto arrival =
-            sample_light(lighting_, lighting_.everything(), surface, surface.origin_above(), -ray.direction,
-                         sequence.point(kLight).x, sequence.point(kPoint), sequence.bits(kAlpha));
+        const auto arrival = sample_light(lighting_, lighting_.everything(), selection, surface, origin,
+                                          -ray.direction, sequence.point(kLight), sequence.bits(kAlpha));
         if (!arrival) continue;
         shadow_rays.set(target.size(), arrival->shadow_ray);
         target.push_back(static_cast<std::uint32_t>(i));

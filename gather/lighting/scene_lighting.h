@@ -82,11 +82,11 @@ struct LightArrival {
 };
 
 /// Chooses one light of `sampler` for a surface. Nothing where no light arrives.
-/// @param origin where rays leave the surface; `outgoing` unit, away from it
+/// @param selection of the sampler at `origin`, where rays leave the surface; `outgoing` unit, away from it
 std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::LightSampler& sampler,
+                                         const core::LightSampler::Selection& selection,
                                          const core::SurfacePoint& surface, const glm::vec3& origin,
-                                         const glm::vec3& outgoing, float u_light, const glm::vec2& u_point,
-                                         std::uint32_t seed);
+                                         const glm::vec3& outgoing, const glm::vec2& u, std::uint32_t seed);
 
 /// A ray in a direction that the BRDF chose, and what its light counts.
 struct LobeRay {
@@ -96,10 +96,12 @@ struct LobeRay {
     core::LightSampler::Selection selection;
 };
 
-/// Of a surface that mirrors_lights(). Nothing where the lobe sends no ray above the surface.
-std::optional<LobeRay> sample_lobe(const core::LightSampler& sampler, const core::SurfacePoint& surface,
-                                   const glm::vec3& origin, const glm::vec3& outgoing, float u_lobe,
-                                   const glm::vec2& u, std::uint32_t seed);
+/// Of a surface that mirrors_lights(). @param selection as of sample_light(). Nothing where the lobe sends no
+/// ray above the surface.
+std::optional<LobeRay> sample_lobe(const core::LightSampler::Selection& selection,
+                                   const core::SurfacePoint& surface, const glm::vec3& origin,
+                                   const glm::vec3& outgoing, float u_lobe, const glm::vec2& u,
+                                   std::uint32_t seed);
 
 /// Traces such rays and gives the radiance that each adds towards its `outgoing` by the light of `sampler`
 /// that it meets, weighted against sample_light(). @return rays that were exhausted

@@ -100,7 +100,7 @@ PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLigh
 PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting& lighting,
                           const VisibleSurfaces& visible, int samples, std::uint32_t frame,
                           std::vector<glm::vec3>& direct) {
-    enum Dimension : std::uint32_t { kLight, kPoint, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
+    enum Dimension : std::uint32_t { kLight, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
     std::atomic<std::uint64_t> ray_count{0}, exhausted{0};
     core::parallel_for(
         static_cast<std::size_t>(visible.height), kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
@@ -116,23 +116,26 @@ PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting&
                 if (!visible.surface(pixel)) continue;
                 const std::uint32_t key = pixel_key(inputs.seed, static_cast<int>(pixel % width),
                                                     static_cast<int>(pixel / width), kDirectUse);
+                const core::SurfacePoint& point = visible.points[pixel];
+                const core::LightSampler::Selection selection =
+                    lighting.sampled().selection({visible.origins[pixel], point.geometric_normal});
+                const bool mirrors = mirrors_lights(point);
                 for (int sample = 0; sample < samples; ++sample) {
                     const core::SampleSequence sequence(key, frame * static_cast<std::uint32_t>(samples) +
                                                                  static_cast<std::uint32_t>(sample));
-                    const core::SurfacePoint& point = visible.points[pixel];
-                    if (mirrors_lights(point)) {
+                    if (mirrors) {
                         const auto lobe =
-                            sample_lobe(lighting.sampled(), point, visible.origins[pixel],
-                                        visible.outgoing[pixel], sequence.point(kLobe).x,
-                                        sequence.point(kLobeDirection), sequence.bits(kLobeAlpha));
+                            sample_lobe(selection, point, visible.origins[pixel], visible.outgoing[pixel],
+                                        sequence.point(kLobe).x, sequence.point(kLobeDirection),
+                                        sequence.bits(kLobeAlpha));
                         if (lobe) {
                             lobes.push_back(*lobe);
                             lobe_pixels.push_back(pixel);
                         }
                     }
-                    const auto arrival = sample_light(
-                        lighting, lighting.sampled(), point, visible.origins[pixel], visible.outgoing[pixel],
-                        sequence.point(kLight).x, sequence.point(kPoint), sequence.bits(kAlpha));
+                    const auto arrival =
+                        sample_light(lighting, lighting.sampled(), selection, point, visible.origins[pixel],
+                                     visible.outgoing[pixel], sequence.point(kLight), sequence.bits(kAlpha));
                     if (!arrival) continue;
                     rays.set(pixels.size(), arrival->shadow_ray);
                     pixels.push_back(pixel);

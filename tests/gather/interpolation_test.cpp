@@ -151,16 +151,17 @@ TEST(HitLighting, LobeRaysAndLightSamplingAddUpOnASmoothMetal) {
         surface.brdf.alpha = roughness * roughness;
         EXPECT_EQ(gather::mirrors_lights(surface), roughness <= 0.5f);
         const glm::vec3 outgoing = glm::normalize(glm::vec3(0.3f, 1.0f, 0.2f));
+        const core::LightSampler::Selection selection = lighting.sampled().selection({glm::vec3(0.0f), kUp});
         double sum = 0.0;
         constexpr std::uint32_t kCount = 1u << 14;
         for (std::uint32_t i = 0; i < kCount; ++i) {
             const core::SampleSequence sequence(7, i);
-            const auto light = gather::sample_light(lighting, lighting.sampled(), surface, glm::vec3(0.0f),
-                                                    outgoing, sequence.point(0).x, sequence.point(1), 0);
+            const auto light = gather::sample_light(lighting, lighting.sampled(), selection, surface,
+                                                    glm::vec3(0.0f), outgoing, sequence.point(0), 0);
             if (light) sum += static_cast<double>(light->specular.x);
             if (!gather::mirrors_lights(surface)) continue;
-            const auto lobe = gather::sample_lobe(lighting.sampled(), surface, glm::vec3(0.0f), outgoing,
-                                                  sequence.point(2).x, sequence.point(3), 0);
+            const auto lobe = gather::sample_lobe(selection, surface, glm::vec3(0.0f), outgoing,
+                                                  sequence.point(1).x, sequence.point(2), 0);
             if (!lobe) continue;
             gather::trace_lobes(
                 scene, tracer, lighting.sampled(), {&*lobe, 1},

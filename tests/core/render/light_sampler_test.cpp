@@ -66,8 +66,8 @@ TEST(LightSampler, ChoosesDirectionsWithTheDensityItClaims) {
     settings.integration_points = 64;  // The density jumps at the triangles' edges, which lie within cells.
     settings.sample_count = 200'000;
     const double p = tests::chi_square_p_value(
-        [&](const glm::vec2& u, float u_group) -> std::optional<glm::vec3> {
-            const auto sample = sampler.sample(receiver, selection, u_group, u);
+        [&](const glm::vec2& u, float) -> std::optional<glm::vec3> {
+            const auto sample = sampler.sample(receiver, selection, u);
             if (!(sample.pdf > 0.0f) || sample.instance == core::kNoIndex) return std::nullopt;
             return sample.direction;
         },
@@ -88,10 +88,9 @@ TEST(LightSampler, EstimatesWhatTheUnweightedSkySends) {
     double sum = 0.0;
     constexpr int kCount = 200000;
     for (int i = 0; i < kCount; ++i) {
-        const auto sample =
-            sampler.sample(receiver, selection, static_cast<float>(random.uniform() * 0.99999994),
-                           {static_cast<float>(random.uniform() * 0.99999994),
-                            static_cast<float>(random.uniform() * 0.99999994)});
+        const auto sample = sampler.sample(receiver, selection,
+                                           {static_cast<float>(random.uniform() * 0.99999994),
+                                            static_cast<float>(random.uniform() * 0.99999994)});
         if (sample.pdf > 0.0f && sample.direction.y > 0.0f) {
             sum += static_cast<double>(sample.radiance.x * sample.direction.y / sample.pdf);
         }
@@ -106,9 +105,8 @@ TEST(LightSampler, GivesNoProbabilityToLightsBelowTheHorizonAndSomeToAllOthers) 
     const auto selection = sampler.selection(away);
     tests::TestRandom random(6);
     for (int i = 0; i < 10000; ++i) {
-        const auto sample =
-            sampler.sample(away, selection, static_cast<float>(random.uniform() * 0.99999994),
-                           {static_cast<float>(random.uniform()), static_cast<float>(random.uniform())});
+        const auto sample = sampler.sample(
+            away, selection, {static_cast<float>(random.uniform()), static_cast<float>(random.uniform())});
         EXPECT_EQ(sample.instance, core::kNoIndex);
     }
 }
@@ -140,10 +138,9 @@ TEST(LightSampler, SamplesASubsetOfEverythingLikeTheWhole) {
     EXPECT_EQ(subset.selection(receiver).floor, selection.floor);
     tests::TestRandom random(9);
     for (int i = 0; i < 10000; ++i) {
-        const auto u_group = static_cast<float>(random.uniform() * 0.9999999);
         const glm::vec2 u(random.uniform() * 0.9999999, random.uniform() * 0.9999999);
-        const auto a = whole.sample(receiver, selection, u_group, u);
-        const auto b = subset.sample(receiver, selection, u_group, u);
+        const auto a = whole.sample(receiver, selection, u);
+        const auto b = subset.sample(receiver, selection, u);
         EXPECT_EQ(a.direction, b.direction);
         EXPECT_EQ(a.radiance, b.radiance);
         EXPECT_EQ(a.pdf, b.pdf);
@@ -166,9 +163,8 @@ TEST(LightSampler, NeverSamplesWhatASubsetLeavesOut) {
     tests::TestRandom random(9);
     bool met_the_other = false;
     for (int i = 0; i < 10000; ++i) {
-        const auto sample =
-            sampler.sample(receiver, selection, static_cast<float>(random.uniform() * 0.9999999),
-                           glm::vec2(random.uniform() * 0.9999999, random.uniform() * 0.9999999));
+        const auto sample = sampler.sample(
+            receiver, selection, glm::vec2(random.uniform() * 0.9999999, random.uniform() * 0.9999999));
         EXPECT_NE(sample.instance, 0u);
         met_the_other = met_the_other || sample.instance == 1u;
     }
