@@ -196,6 +196,7 @@ Settings quality_settings(std::string_view quality) {
         settings.screen_probes.jitter_interpolation = true;  // Few frames show the grid otherwise.
         settings.screen_probes.adaptive_budget = 0.25f;
         settings.integrate.specular_directions = 1;
+        settings.integrate.reflection_rays = 1;
         settings.integrate.bent_normal_rays = 2;
     } else if (quality == "high" || quality == "ultra") {
         const bool ultra = quality == "ultra";
