@@ -62,7 +62,7 @@ PROOF = {
     "alpha_mask": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
     "alpha_blend": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
     "screen_probes": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
-    "adaptive_probes": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
+    "adaptive_probes": (DARK_SCENE, "shared:scenes/menger_sponge3/mengerSponge3.glb", 8, ["--sky=1,1,1"]),
     "lighting_pdf": (DARK_SCENE, "assets/two_rooms.glb", 4, []),
     "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
     "rough_specular": ("assets/cornell_box.glb", "shared:scenes/suzanne/Suzanne.gltf", 8, ["--sky=1,1,1"]),
