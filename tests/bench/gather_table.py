@@ -50,6 +50,7 @@ PROBE_PASSES = ("place_probes", "near_field", "filter_probes", "integrate", "ben
 
 # Of proof, by effect: a scene that auto drops it in, a scene that needs it, frames, and flags of camera and light.
 LIVING_ROOM = ["--eye=0,1.2,0", "--look-at=0,0.5,8", "--fov=75", "--sun=10,20,60", "--sky=3,4,6"]
+LIVING_ROOM_INSIDE = ["--eye=0,1.2,1", "--look-at=0,0,-1", "--fov=70", "--sky=3,4,6"]  # windows behind the camera
 LIVING_ROOM_SCENE = "shared:scenes/living_room_godot/living_room.glb"
 ALPHA_SCENE = "shared:scenes/alpha_blend_mode_test/AlphaBlendModeTest.glb"
 LAMP_SCENE = "shared:scenes/lights_punctual_lamp/LightsPunctualLamp.gltf"
@@ -63,7 +64,7 @@ PROOF = {
     "alpha_blend": ("assets/cornell_box.glb", ALPHA_SCENE, 2, ["--sun=30,45,3", "--sky=1,1,1"]),
     "screen_probes": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
     "adaptive_probes": (DARK_SCENE, "shared:scenes/menger_sponge3/mengerSponge3.glb", 8, ["--sky=1,1,1"]),
-    "lighting_pdf": (DARK_SCENE, "assets/two_rooms.glb", 4, []),
+    "lighting_pdf": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM_INSIDE),
     "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
     "rough_specular": ("assets/cornell_box.glb", "shared:scenes/suzanne/Suzanne.gltf", 8, ["--sky=1,1,1"]),
     "reflections": ("assets/cornell_box.glb", "assets/glossy.glb", 8, []),
