@@ -72,9 +72,10 @@ public:
           lighting_(inputs.scene, inputs.tracer, planned_lighting(settings, plan)),
           hit_lighting_(inputs.scene, inputs.tracer, lighting_,
                         settings.bounces > 0 && !lighting_.everything().empty(),
-                        settings.lighting.hit_roughness_min),
+                        settings.lighting.hit_roughness_min, settings.lighting.hit_roughness_min),
           mirrored_lighting_(inputs.scene, inputs.tracer, lighting_,
-                             settings.bounces > 0 && !lighting_.everything().empty(), 0.0f),
+                             settings.bounces > 0 && !lighting_.everything().empty(), 0.0f,
+                             settings.lighting.hit_roughness_min),
           table_(settings.screen_probes.resolution),
           outlines_(inputs.width, inputs.height,
                     plan.on(Effect::kTemporal) ? settings.film.outline_samples : 1),
@@ -91,7 +92,12 @@ public:
             return find_visible_surfaces(inputs_, lighting_, outlines_.film_indices(), visible_);
         });
         if (outlines_.wanted()) {
-            ledger_.time("outlines", [&] { return outlines_.sample(inputs_, lighting_, visible_); });
+            Outlines::Rays rays;
+            ledger_.time("outlines", [&] {
+                rays = outlines_.sample(inputs_, lighting_, visible_);
+                return PassRays{rays.camera_rays, rays.exhausted};
+            });
+            ledger_.time("outline_shadows", [&] { return PassRays{rays.shadow_rays, 0}; });
         }
         if (lighting_.samples_anything()) {
             ledger_.time("direct", [&] {
@@ -259,12 +265,11 @@ FramePixel Picture::outline_pixel(const OutlineSample& sample) const {
     FramePixel value;
     if (sample.source != OutlineSample::kSky) {
         value = frame_pixel(sample.source);
-        value.direct = sample.tint * direct_[sample.source];
         value.indirect_diffuse *= sample.tint;
         value.indirect_specular *= sample.tint;
         value.albedo *= sample.tint;
     }
-    value.direct += sample.emitted;
+    value.direct = sample.direct;
     value.steps = static_cast<float>(sample.steps);
     return value;
 }
@@ -275,7 +280,7 @@ void Picture::accumulate() {
     });
     outlines_.for_pixels([&](std::span<const OutlineSample> samples) {
         for (const OutlineSample& sample : samples) {
-            if (sample.source != OutlineSample::kUnlit)
+            if (sample.source != OutlineSample::kAlone)
                 accumulation_.add(sample.pixel, outline_pixel(sample));
         }
     });

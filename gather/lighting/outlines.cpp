@@ -96,46 +96,63 @@ Outlines::Outlines(int width, int height, int samples) : further_(static_cast<st
     if (further_ > 0) marks_.assign(pixels, 0);
 }
 
-PassRays Outlines::sample(const core::RenderInputs& inputs, const SceneLighting& lighting,
-                          const VisibleSurfaces& visible) {
+Outlines::Rays Outlines::sample(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                                const VisibleSurfaces& visible) {
     const core::CameraRays camera(inputs.camera, inputs.width, inputs.height);
     const auto width = static_cast<std::size_t>(visible.width);
     samples_.assign(pixels_.size() * further_, OutlineSample{});
-    std::atomic<std::uint64_t> exhausted{0};
+    std::atomic<std::uint64_t> shadow_rays{0}, exhausted{0};
     core::parallel_for(pixels_.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
         const core::ScopedFlushDenormals flush;
         core::RayStream rays;
         core::HitStream hits;
-        rays.resize((end - begin) * further_);
-        for (std::size_t i = 0; i < rays.size(); ++i) {
-            const std::size_t pixel = pixels_[begin + i / further_];
-            const auto further = static_cast<std::uint32_t>(1 + i % further_);
+        VisibleSurfaces seen;
+        const std::size_t count = (end - begin) * further_;
+        rays.resize(count);
+        seen.resize(static_cast<int>(count), 1);
+        const auto pixel_of = [&](std::size_t i) {
+            return static_cast<std::size_t>(pixels_[begin + i / further_]);
+        };
+        const auto film_index_of = [&](std::size_t i) {
+            return film_indices_[pixel_of(i)] + static_cast<std::uint32_t>(1 + i % further_);
+        };
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t pixel = pixel_of(i);
             rays.set(i, film_ray(inputs, camera, static_cast<int>(pixel % width),
-                                 static_cast<int>(pixel / width), film_indices_[pixel] + further));
+                                 static_cast<int>(pixel / width), film_index_of(i)));
         }
         inputs.primary.trace_closest(rays, hits);
         std::uint64_t lost = 0;
-        for (std::size_t i = 0; i < rays.size(); ++i) {
+        for (std::size_t i = 0; i < count; ++i) {
+            lost += see(inputs, lighting, camera, rays.get(i), hits.get(i), i, seen) ? 0 : 1;
+        }
+        std::vector<glm::vec3> direct(count, glm::vec3(0.0f));
+        if (lighting.samples_anything()) {
+            const PassRays light = light_surfaces(
+                inputs, lighting, seen, 0, count, 1,
+                [&](std::size_t i) {
+                    const std::size_t pixel = pixel_of(i);
+                    return SampleId{pixel_key(inputs.seed, static_cast<int>(pixel % width),
+                                              static_cast<int>(pixel / width), kOutlineUse),
+                                    film_index_of(i)};
+                },
+                direct);
+            shadow_rays += light.rays;
+            lost += light.exhausted;
+        }
+        for (std::size_t i = 0; i < count; ++i) {
             OutlineSample& sample = samples_[begin * further_ + i];
-            const std::size_t pixel = pixels_[begin + i / further_];
-            sample.pixel = static_cast<std::uint32_t>(pixel);
-            sample.steps = hits.steps[i];
-            const core::Ray ray = rays.get(i);
-            if (hits.status[i] == core::HitStatus::kExhausted) {
-                ++lost;  // Black, as where the first sample is lost.
-            } else if (hits.status[i] == core::HitStatus::kMiss) {
-                sample.emitted = lighting.seen_sky(ray.direction);
-            } else {
-                const core::SurfacePoint point = core::surface_at(inputs.scene, ray, hits.get(i));
-                const auto source = find_source(visible, pixel, point);
-                sample.emitted = point.emission;
-                sample.source = source ? static_cast<std::uint32_t>(*source) : OutlineSample::kUnlit;
-                if (source) sample.tint = tint_between(visible.points[*source], point);
-            }
+            sample.pixel = pixels_[begin + i / further_];
+            sample.steps = seen.steps[i];
+            sample.direct = seen.emitted[i] + direct[i];
+            if (!seen.surface(i)) continue;
+            const auto source = find_source(visible, sample.pixel, seen.points[i]);
+            sample.source = source ? static_cast<std::uint32_t>(*source) : OutlineSample::kAlone;
+            if (source) sample.tint = tint_between(visible.points[*source], seen.points[i]);
         }
         exhausted += lost;
     });
-    return {pixels_.size() * further_, exhausted};
+    return {pixels_.size() * further_, shadow_rays, exhausted};
 }
 
 void Outlines::for_pixels(const std::function<void(std::span<const OutlineSample>)>& body) const {

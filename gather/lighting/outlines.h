@@ -1,9 +1,10 @@
 // gather/lighting/outlines.h: more samples of the film where an outline crosses a pixel.
 //
-// A frame shades one sample a pixel, so that few frames leave outlines ragged. Pixels in which an earlier
-// frame found an outline take further camera rays. Those cost no lighting: each takes the light of the
-// nearest sample of this frame beside it on the same surface, and its own emission or sky. Which pixels take
-// them depends on earlier frames alone: a sample that chose its own company would weigh itself wrongly.
+// A frame lights one sample a pixel with care, so that few frames leave outlines ragged. Pixels in which an
+// earlier frame found an outline take further camera rays. These have their own emission, sky and direct
+// light by one shadow ray; their indirect light is that of the nearest of the frame's samples beside them on
+// the same surface. Which pixels take them depends on earlier frames alone: a sample that chose its own
+// company would weigh itself wrongly.
 #pragma once
 
 #include <cstdint>
@@ -21,13 +22,13 @@ namespace gather {
 /// A further sample of a pixel's film.
 struct OutlineSample {
     std::uint32_t pixel = 0;
-    std::uint32_t source = kSky;  ///< The pixel whose light it takes, or one of:
+    std::uint32_t source = kSky;  ///< The pixel whose indirect light it takes, or one of:
     glm::vec3 tint{1.0f};         ///< Its albedo over the source's.
-    glm::vec3 emitted{0.0f};      ///< As VisibleSurfaces::emitted.
+    glm::vec3 direct{0.0f};       ///< Emission or sky, and light of S.
     std::uint32_t steps = 0;
 
     static constexpr std::uint32_t kSky = 0xffffffffu;    ///< No surface.
-    static constexpr std::uint32_t kUnlit = 0xfffffffeu;  ///< No sample stands for it: it does not count.
+    static constexpr std::uint32_t kAlone = 0xfffffffeu;  ///< No sample is on its surface: it does not count.
 };
 
 /// The samples of the film of all pixels over the frames of a picture.
@@ -42,9 +43,13 @@ public:
     /// Whether pixels may take further samples.
     bool wanted() const { return further_ > 0; }
 
+    struct Rays {
+        std::uint64_t camera_rays = 0, shadow_rays = 0, exhausted = 0;
+    };
+
     /// Takes the further samples of this frame, those of a pixel in a row.
-    PassRays sample(const core::RenderInputs& inputs, const SceneLighting& lighting,
-                    const VisibleSurfaces& visible);
+    Rays sample(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                const VisibleSurfaces& visible);
 
     /// Calls `body` with the further samples of some pixels, from several threads; each pixel's in one call.
     void for_pixels(const std::function<void(std::span<const OutlineSample>)>& body) const;

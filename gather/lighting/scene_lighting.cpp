@@ -143,7 +143,8 @@ int SceneLighting::direct_samples(int wanted) const {
 std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::LightSampler& sampler,
                                          const core::LightSampler::Selection& selection,
                                          const core::SurfacePoint& surface, const glm::vec3& origin,
-                                         const glm::vec3& outgoing, const glm::vec2& u, std::uint32_t seed) {
+                                         const glm::vec3& outgoing, const glm::vec2& u, std::uint32_t seed,
+                                         float point_alpha_min) {
     const core::LightSampler::Sample light =
         sampler.sample(core::LightReceiver{origin, surface.geometric_normal}, selection, u);
     if (!(light.pdf > 0.0f) || !any_positive(light.radiance) ||
@@ -151,8 +152,9 @@ std::optional<LightArrival> sample_light(const SceneLighting& lighting, const co
         return std::nullopt;
     }
     const glm::vec3 incoming = surface.frame.to_local(light.direction);
-    const core::BrdfEvaluation brdf =
-        core::evaluate(surface.brdf, surface.frame.to_local(outgoing), incoming);
+    core::Brdf lobes = surface.brdf;
+    if (light.delta) lobes.alpha = std::max(lobes.alpha, point_alpha_min);
+    const core::BrdfEvaluation brdf = core::evaluate(lobes, surface.frame.to_local(outgoing), incoming);
     const float weight =
         mirrors_lights(surface) && !light.delta ? core::power_heuristic(light.pdf, brdf.pdf) : 1.0f;
     const glm::vec3 irradiance = light.radiance * (weight * incoming.z / light.pdf);
@@ -259,7 +261,8 @@ HitLightingCounters HitLighting::shade(const core::RayStream& rays, const core::
             }
         }
         const auto arrival = sample_light(lighting_, lighting_.everything(), selection, surface, origin,
-                                          -ray.direction, sequence.point(kLight), sequence.bits(kAlpha));
+                                          -ray.direction, sequence.point(kLight), sequence.bits(kAlpha),
+                                          point_roughness_min_ * point_roughness_min_);
         if (!arrival) continue;
         shadow_rays.set(target.size(), arrival->shadow_ray);
         target.push_back(static_cast<std::uint32_t>(i));

@@ -83,10 +83,12 @@ struct LightArrival {
 
 /// Chooses one light of `sampler` for a surface. Nothing where no light arrives.
 /// @param selection of the sampler at `origin`, where rays leave the surface; `outgoing` unit, away from it
+/// @param point_alpha_min the lobes are at least this wide for lights without a surface
 std::optional<LightArrival> sample_light(const SceneLighting& lighting, const core::LightSampler& sampler,
                                          const core::LightSampler::Selection& selection,
                                          const core::SurfacePoint& surface, const glm::vec3& origin,
-                                         const glm::vec3& outgoing, const glm::vec2& u, std::uint32_t seed);
+                                         const glm::vec3& outgoing, const glm::vec2& u, std::uint32_t seed,
+                                         float point_alpha_min = 0.0f);
 
 /// A ray in a direction that the BRDF chose, and what its light counts.
 struct LobeRay {
@@ -123,13 +125,16 @@ public:
     /// @param roughness_min smoother surfaces are lit as if this rough (Kaplanyan and Dachsbacher, "Path
     /// Space Regularization for Holistic and Robust Light Transport", 2013): a lamp that few rays see
     /// mirrored would shine on all that read their probe
+    /// @param point_roughness_min likewise for lights without a surface alone, which no ray meets: in a
+    /// smooth surface they are nothing but fireflies
     HitLighting(const core::Scene& scene, const core::Tracer& tracer, const SceneLighting& lighting,
-                bool direct_light, float roughness_min, Bounced bounced = nullptr)
+                bool direct_light, float roughness_min, float point_roughness_min, Bounced bounced = nullptr)
         : scene_(scene),
           tracer_(tracer),
           lighting_(lighting),
           direct_(direct_light),
           roughness_min_(roughness_min),
+          point_roughness_min_(point_roughness_min),
           bounced_(bounced) {}
 
     /// @param keys of the random numbers, one a ray; `frame` their index
@@ -144,6 +149,7 @@ private:
     const SceneLighting& lighting_;
     bool direct_;
     float roughness_min_;
+    float point_roughness_min_;
     Bounced bounced_;
 };
 

@@ -49,12 +49,33 @@ core::Ray film_ray(const core::RenderInputs& inputs, const core::CameraRays& cam
     return ray;
 }
 
+bool see(const core::RenderInputs& inputs, const SceneLighting& lighting, const core::CameraRays& camera,
+         const core::Ray& ray, const core::Hit& hit, std::size_t index, VisibleSurfaces& result) {
+    result.depth[index] = 0.0f;
+    result.distance[index] = 0.0f;
+    result.steps[index] = hit.steps;
+    if (hit.status != core::HitStatus::kHit) {
+        const bool is_lost = hit.status == core::HitStatus::kExhausted;
+        result.emitted[index] = is_lost ? glm::vec3(0.0f) : lighting.seen_sky(ray.direction);
+        return !is_lost;
+    }
+    const bool change_of_tracer = &inputs.primary != &inputs.tracer;
+    core::SurfacePoint& point = result.points[index];
+    point = core::surface_at(inputs.scene, ray, hit);
+    result.emitted[index] = point.emission;
+    result.outgoing[index] = -ray.direction;
+    result.origins[index] =
+        point.origin_above(change_of_tracer ? lighting.start_offset(point.instance) : 0.0f);
+    result.depth[index] = std::max(camera.depth(point.position), std::numeric_limits<float>::min());
+    result.distance[index] = hit.t;
+    return true;
+}
+
 PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
                                const std::vector<std::uint32_t>& film_indices, VisibleSurfaces& result) {
     result.resize(inputs.width, inputs.height);
     const core::CameraRays camera(inputs.camera, inputs.width, inputs.height);
     result.footprint = PixelFootprint(camera, inputs.width, inputs.height);
-    const bool change_of_tracer = &inputs.primary != &inputs.tracer;
     std::atomic<std::uint64_t> exhausted{0};
     core::parallel_for(
         static_cast<std::size_t>(inputs.height), kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
@@ -71,88 +92,80 @@ PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLigh
             inputs.primary.trace_closest(rays, hits);
             std::uint64_t lost = 0;
             for (std::size_t i = 0; i < rays.size(); ++i) {
-                const std::size_t pixel = first + i;
-                const core::Ray ray = rays.get(i);
-                result.depth[pixel] = 0.0f;
-                result.distance[pixel] = 0.0f;
-                result.steps[pixel] = hits.steps[i];
-                if (hits.status[i] != core::HitStatus::kHit) {
-                    const bool is_lost = hits.status[i] == core::HitStatus::kExhausted;
-                    lost += is_lost ? 1 : 0;
-                    result.emitted[pixel] = is_lost ? glm::vec3(0.0f) : lighting.seen_sky(ray.direction);
-                    continue;
-                }
-                core::SurfacePoint& point = result.points[pixel];
-                point = core::surface_at(inputs.scene, ray, hits.get(i));
-                result.emitted[pixel] = point.emission;
-                result.outgoing[pixel] = -ray.direction;
-                result.origins[pixel] =
-                    point.origin_above(change_of_tracer ? lighting.start_offset(point.instance) : 0.0f);
-                result.depth[pixel] =
-                    std::max(camera.depth(point.position), std::numeric_limits<float>::min());
-                result.distance[pixel] = hits.t[i];
+                lost += see(inputs, lighting, camera, rays.get(i), hits.get(i), first + i, result) ? 0 : 1;
             }
             exhausted += lost;
         });
     return {static_cast<std::uint64_t>(inputs.width) * static_cast<std::uint64_t>(inputs.height), exhausted};
 }
 
+PassRays light_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                        const VisibleSurfaces& visible, std::size_t begin, std::size_t end, int samples,
+                        const std::function<SampleId(std::size_t)>& id, std::span<glm::vec3> direct) {
+    enum Dimension : std::uint32_t { kLight, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
+    core::RayStream rays;
+    std::vector<std::size_t> targets;
+    std::vector<glm::vec3> arriving;
+    std::vector<LobeRay> lobes;
+    std::vector<std::size_t> lobe_targets;
+    rays.resize((end - begin) * static_cast<std::size_t>(samples));
+    for (std::size_t i = begin; i < end; ++i) {
+        if (!visible.surface(i)) continue;
+        const SampleId numbers = id(i);
+        const core::SurfacePoint& point = visible.points[i];
+        const core::LightSampler::Selection selection =
+            lighting.sampled().selection({visible.origins[i], point.geometric_normal});
+        const bool mirrors = mirrors_lights(point);
+        for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(samples); ++sample) {
+            const core::SampleSequence sequence(numbers.key, numbers.first + sample);
+            if (mirrors) {
+                const auto lobe = sample_lobe(selection, point, visible.origins[i], visible.outgoing[i],
+                                              sequence.point(kLobe).x, sequence.point(kLobeDirection),
+                                              sequence.bits(kLobeAlpha));
+                if (lobe) {
+                    lobes.push_back(*lobe);
+                    lobe_targets.push_back(i);
+                }
+            }
+            const auto arrival =
+                sample_light(lighting, lighting.sampled(), selection, point, visible.origins[i],
+                             visible.outgoing[i], sequence.point(kLight), sequence.bits(kAlpha));
+            if (!arrival) continue;
+            rays.set(targets.size(), arrival->shadow_ray);
+            targets.push_back(i);
+            arriving.push_back((arrival->diffuse + arrival->specular) / static_cast<float>(samples));
+        }
+    }
+    rays.resize(targets.size());
+    std::vector<std::uint8_t> occluded(targets.size());
+    if (!targets.empty()) inputs.tracer.trace_occluded(rays, occluded);
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+        if (!occluded[i]) direct[targets[i]] += arriving[i];
+    }
+    const float share = 1.0f / static_cast<float>(samples);
+    const std::uint64_t exhausted =
+        trace_lobes(inputs.scene, inputs.tracer, lighting.sampled(), lobes,
+                    [&](std::size_t i, const glm::vec3& light) { direct[lobe_targets[i]] += share * light; });
+    return {targets.size() + lobes.size(), exhausted};
+}
+
 PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting& lighting,
                           const VisibleSurfaces& visible, int samples, std::uint32_t frame,
                           std::vector<glm::vec3>& direct) {
-    enum Dimension : std::uint32_t { kLight, kAlpha, kLobe, kLobeDirection, kLobeAlpha };
+    const auto width = static_cast<std::size_t>(visible.width);
+    const auto id = [&](std::size_t pixel) {
+        return SampleId{pixel_key(inputs.seed, static_cast<int>(pixel % width),
+                                  static_cast<int>(pixel / width), kDirectUse),
+                        frame * static_cast<std::uint32_t>(samples)};
+    };
     std::atomic<std::uint64_t> ray_count{0}, exhausted{0};
     core::parallel_for(
         static_cast<std::size_t>(visible.height), kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
             const core::ScopedFlushDenormals flush;
-            const auto width = static_cast<std::size_t>(visible.width);
-            core::RayStream rays;
-            std::vector<std::size_t> pixels;
-            std::vector<glm::vec3> arriving;
-            std::vector<LobeRay> lobes;
-            std::vector<std::size_t> lobe_pixels;
-            rays.resize((end - begin) * width * static_cast<std::size_t>(samples));
-            for (std::size_t pixel = begin * width; pixel < end * width; ++pixel) {
-                if (!visible.surface(pixel)) continue;
-                const std::uint32_t key = pixel_key(inputs.seed, static_cast<int>(pixel % width),
-                                                    static_cast<int>(pixel / width), kDirectUse);
-                const core::SurfacePoint& point = visible.points[pixel];
-                const core::LightSampler::Selection selection =
-                    lighting.sampled().selection({visible.origins[pixel], point.geometric_normal});
-                const bool mirrors = mirrors_lights(point);
-                for (int sample = 0; sample < samples; ++sample) {
-                    const core::SampleSequence sequence(key, frame * static_cast<std::uint32_t>(samples) +
-                                                                 static_cast<std::uint32_t>(sample));
-                    if (mirrors) {
-                        const auto lobe =
-                            sample_lobe(selection, point, visible.origins[pixel], visible.outgoing[pixel],
-                                        sequence.point(kLobe).x, sequence.point(kLobeDirection),
-                                        sequence.bits(kLobeAlpha));
-                        if (lobe) {
-                            lobes.push_back(*lobe);
-                            lobe_pixels.push_back(pixel);
-                        }
-                    }
-                    const auto arrival =
-                        sample_light(lighting, lighting.sampled(), selection, point, visible.origins[pixel],
-                                     visible.outgoing[pixel], sequence.point(kLight), sequence.bits(kAlpha));
-                    if (!arrival) continue;
-                    rays.set(pixels.size(), arrival->shadow_ray);
-                    pixels.push_back(pixel);
-                    arriving.push_back((arrival->diffuse + arrival->specular) / static_cast<float>(samples));
-                }
-            }
-            rays.resize(pixels.size());
-            std::vector<std::uint8_t> occluded(pixels.size());
-            if (!pixels.empty()) inputs.tracer.trace_occluded(rays, occluded);
-            for (std::size_t i = 0; i < pixels.size(); ++i) {
-                if (!occluded[i]) direct[pixels[i]] += arriving[i];
-            }
-            const float share = 1.0f / static_cast<float>(samples);
-            exhausted += trace_lobes(
-                inputs.scene, inputs.tracer, lighting.sampled(), lobes,
-                [&](std::size_t i, const glm::vec3& light) { direct[lobe_pixels[i]] += share * light; });
-            ray_count += pixels.size() + lobes.size();
+            const PassRays rays =
+                light_surfaces(inputs, lighting, visible, begin * width, end * width, samples, id, direct);
+            ray_count += rays.rays;
+            exhausted += rays.exhausted;
         });
     return {ray_count, exhausted};
 }

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "core/render/renderer.h"
@@ -63,18 +65,35 @@ enum PixelUse : std::uint32_t {
     kSpecularUse,
     kBentNormalUse,
     kVisibilityUse,
-    kReflectionUse
+    kReflectionUse,
+    kOutlineUse
 };
 
 /// The camera ray through the sample of a pixel's film that has this index in its sequence.
 core::Ray film_ray(const core::RenderInputs& inputs, const core::CameraRays& camera, int x, int y,
                    std::uint32_t film_index);
 
+/// Writes down what a camera ray found. @return false for one that was exhausted, which claims neither
+/// surface nor sky
+bool see(const core::RenderInputs& inputs, const SceneLighting& lighting, const core::CameraRays& camera,
+         const core::Ray& ray, const core::Hit& hit, std::size_t index, VisibleSurfaces& result);
+
 /// One camera ray a pixel. @param film_indices by pixel, of its sample
 PassRays find_visible_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
                                const std::vector<std::uint32_t>& film_indices, VisibleSurfaces& result);
 
-/// Adds the light of S to each pixel, `samples` lights each by a shadow ray.
+/// The random numbers of a surface's light samples: their sequence, and the first one's index in it.
+struct SampleId {
+    std::uint32_t key = 0;
+    std::uint32_t first = 0;
+};
+
+/// Adds the light of S to the surfaces from `begin` up to `end`, `samples` lights each by a shadow ray.
+PassRays light_surfaces(const core::RenderInputs& inputs, const SceneLighting& lighting,
+                        const VisibleSurfaces& visible, std::size_t begin, std::size_t end, int samples,
+                        const std::function<SampleId(std::size_t)>& id, std::span<glm::vec3> direct);
+
+/// Likewise to each pixel.
 PassRays add_direct_light(const core::RenderInputs& inputs, const SceneLighting& lighting,
                           const VisibleSurfaces& visible, int samples, std::uint32_t frame,
                           std::vector<glm::vec3>& direct);
