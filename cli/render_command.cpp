@@ -54,11 +54,10 @@ void parse_crop(const std::string& text, RenderOptions& options) {
 }
 
 /// Layers that one renderer alone can write.
-const std::map<std::string, RendererKind> kLayersOfOne = {{"Variance", RendererKind::kPath},
-                                                          {"BentNormal", RendererKind::kGather},
-                                                          {"Probes", RendererKind::kGather},
-                                                          {"RaysPerTexel", RendererKind::kGather},
-                                                          {"ProbeWeight", RendererKind::kGather}};
+const std::map<std::string, RendererKind> kLayersOfOne = {
+    {"Variance", RendererKind::kPath},      {"BentNormal", RendererKind::kGather},
+    {"Probes", RendererKind::kGather},      {"RaysPerTexel", RendererKind::kGather},
+    {"ProbeWeight", RendererKind::kGather}, {"FilmSamples", RendererKind::kGather}};
 
 /// The flags that belong to one renderer alone; the others' are usage errors.
 void understand_renderer(const RenderFlags& flags, RenderOptions& options) {
@@ -181,7 +180,7 @@ void add_render_command(CLI::App& app, Program& program) {
             "--aov", flags->aovs,
             "Further layers: "
             "Depth,Normal,Albedo,Direct,IndirectDiffuse,IndirectSpecular,HitDistance,Steps; of the path "
-            "tracer Variance; of the gather BentNormal,Probes,RaysPerTexel,ProbeWeight")
+            "tracer Variance; of the gather BentNormal,Probes,RaysPerTexel,ProbeWeight,FilmSamples")
         ->delimiter(',');
     verb->add_flag("--half", options.half, "16-bit colour layers; saturates at 65,504");
     verb->add_flag("--png", options.png, "Write a tone-mapped preview beside the EXR");

@@ -345,7 +345,8 @@ core::Frame Picture::finish(int frame_count) {
 void check_layers(const std::set<std::string>& layers) {
     static const std::set<std::string> known = {
         "Depth",       "Normal",     "Albedo", "Direct", "IndirectDiffuse", "IndirectSpecular",
-        "HitDistance", "BentNormal", "Steps",  "Probes", "RaysPerTexel",    "ProbeWeight"};
+        "HitDistance", "BentNormal", "Steps",  "Probes", "RaysPerTexel",    "ProbeWeight",
+        "FilmSamples"};
     for (const std::string& layer : layers) {
         if (known.count(layer)) continue;
         std::string names;

@@ -86,6 +86,10 @@ core::Image Accumulation::develop() const {
     add_number("Depth", "Depth.Z", &AuxiliarySum::depth);
     add_number("HitDistance", "HitDistance.Z", &AuxiliarySum::distance);
     add_number("ProbeWeight", "ProbeWeight.Y", &AuxiliarySum::probe_support);
+    if (layers_.count("FilmSamples")) {
+        std::vector<float>& values = image.add_channel("FilmSamples.Y");
+        for (std::size_t i = 0; i < count; ++i) values[i] = sums_[i].count;
+    }
     if (layers_.count("Steps")) {
         std::vector<float>& values = image.add_channel("Steps.Y");
         for (std::size_t i = 0; i < count; ++i) values[i] = auxiliary_sums_[i].steps / sums_[i].count;
