@@ -196,7 +196,6 @@ Settings quality_settings(std::string_view quality) {
         settings.screen_probes.jitter_interpolation = true;  // Few frames show the grid otherwise.
         settings.screen_probes.adaptive_budget = 0.25f;
         settings.integrate.specular_directions = 1;
-        settings.integrate.reflection_rays = 1;
         settings.integrate.bent_normal_rays = 2;
     } else if (quality == "high" || quality == "ultra") {
         const bool ultra = quality == "ultra";
@@ -204,6 +203,7 @@ Settings quality_settings(std::string_view quality) {
         settings.screen_probes.spacing = 8;
         settings.screen_probes.resolution = ultra ? 16 : 8;
         settings.integrate.specular_directions = ultra ? 8 : 4;
+        settings.integrate.reflection_rays = ultra ? 4 : 2;
         settings.integrate.bent_normal_rays = ultra ? 8 : 4;
     } else {
         fail(fmt::format("--quality {}: is draft, medium, high or ultra", quality));
