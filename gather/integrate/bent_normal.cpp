@@ -145,7 +145,6 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
     NearHits found;
     std::size_t count = 0;
     for (std::size_t i = 0; i < in.pixels.size(); ++i) count += in.occluded[i] || in.alone[i] ? 1 : 0;
-    if (count == 0) return;
     found.rays.resize(count);
     found.hits.resize(count);
     found.radiance.resize(count);
@@ -155,7 +154,9 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
         found.hits.set(found.keys.size(), in.hits.get(i));
         found.keys.push_back(in.keys[i]);
     }
-    counters = near.hit_lighting.shade(found.rays, found.hits, found.keys, frame_, found.radiance);
+    if (count > 0) {
+        counters = near.hit_lighting.shade(found.rays, found.hits, found.keys, frame_, found.radiance);
+    }
     std::size_t shaded = 0;
     for (std::size_t i = 0; i < in.pixels.size(); ++i) {
         const std::size_t pixel = in.pixels[i];
@@ -164,7 +165,7 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
         glm::vec3 own(0.0f);
         if (has_own) own = found.radiance[shaded++];
         glm::vec3 held(0.0f);
-        if (light.probe_share > 0.0f && (has_own || light.probe_share < 1.0f)) {
+        if (!in.alone[i] && (has_own ? light.probe_share > 0.0f : light.probe_share < 1.0f)) {
             const ProbeWeights& weights = near.weights[pixel];
             const glm::vec2 at = core::octahedral_from_direction(in.rays.get(i).direction);
             for (std::size_t k = 0; k < weights.count; ++k) {
