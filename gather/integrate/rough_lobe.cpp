@@ -29,9 +29,8 @@ Lobe project(float roughness, float cosine) {
     brdf.f0 = brdf.f90 = glm::vec3(1.0f);
     brdf.alpha = std::max(core::kMinimumAlpha, roughness * roughness);
     Lobe lobe;
-    // Half of the square: the other is its mirror image in y, in which these functions are even.
     for (int j = 0; j < kQuadrature; ++j) {
-        for (int i = 0; i < kQuadrature / 2; ++i) {
+        for (int i = 0; i < kQuadrature; ++i) {
             const glm::vec2 u((static_cast<float>(i) + 0.5f) / kQuadrature,
                               (static_cast<float>(j) + 0.5f) / kQuadrature);
             const core::BrdfSample sample = core::sample_specular(brdf, outgoing, u);
@@ -42,7 +41,7 @@ Lobe project(float roughness, float cosine) {
             const float grazing = rest * rest * rest * rest * rest;
             const core::Sh basis = core::sh_basis(sample.incoming);
             for (std::size_t k = 0; k < kEven.size(); ++k) {
-                const float value = weight * basis[kEven[k]] / (kQuadrature * kQuadrature / 2);
+                const float value = weight * basis[kEven[k]] / (kQuadrature * kQuadrature);
                 lobe.base[k] += (1.0f - grazing) * value;
                 lobe.grazing[k] += grazing * value;
             }
