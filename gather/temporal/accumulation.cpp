@@ -55,13 +55,13 @@ core::Image Accumulation::develop() const {
     };
     // Differences of near light may leave a mean below 0 by their noise; frames are never clamped.
     const auto diffuse = [](const Sum& s) { return glm::max(s.indirect_diffuse, glm::vec3(0.0f)); };
-    add_color("", [&](const Sum& s) { return s.direct + diffuse(s) + s.indirect_specular; });
+    const auto specular = [](const Sum& s) { return glm::max(s.indirect_specular, glm::vec3(0.0f)); };
+    add_color("", [&](const Sum& s) { return s.direct + diffuse(s) + specular(s); });
     std::vector<float>& alpha = image.add_channel("A");
     for (std::size_t i = 0; i < count; ++i) alpha[i] = sums_[i].surface_count / sums_[i].count;
     if (layers_.count("Direct")) add_color("Direct", [](const Sum& s) { return s.direct; });
     if (layers_.count("IndirectDiffuse")) add_color("IndirectDiffuse", diffuse);
-    if (layers_.count("IndirectSpecular"))
-        add_color("IndirectSpecular", [](const Sum& s) { return s.indirect_specular; });
+    if (layers_.count("IndirectSpecular")) add_color("IndirectSpecular", specular);
     // Means over the samples that saw a surface.
     const auto share = [&](std::size_t i) {
         return sums_[i].surface_count > 0.0f ? 1.0f / sums_[i].surface_count : 0.0f;

@@ -180,7 +180,7 @@ TEST(GatherLeak, ThinWallsLetNothingThrough) {
     EXPECT_NEAR(lit / truth, 1.0, 0.02);
 }
 
-TEST(GatherScenes, EveryRealSceneIsFiniteAndAutoEqualsAll) {
+TEST(GatherScenes, EveryRealSceneIsFiniteNowhereBelowZeroAndAutoEqualsAll) {
     FIELDLIGHT_NEED_SHARED(folder, "scenes");
     int count = 0;
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -197,6 +197,10 @@ TEST(GatherScenes, EveryRealSceneIsFiniteAndAutoEqualsAll) {
             settings.frames = 2;
             const core::Frame automatic = gathered(scene, camera, settings, 1, "auto");
             EXPECT_EQ(core::count_nonfinite(automatic.image), 0u);
+            for (const char* channel : {"R", "G", "B"}) {
+                const std::vector<float>& values = *automatic.image.find(channel);
+                EXPECT_GE(*std::min_element(values.begin(), values.end()), 0.0f) << channel;
+            }
             tests::expect_same_bits(automatic.image, gathered(scene, camera, settings, 1, "all").image);
             ++count;
         }
