@@ -25,7 +25,7 @@ std::vector<std::string_view> passes_of(Effect effect) {
             return {"primary",       "direct",      "trace_probes",
                     "probe_shadows", "bent_normal", "bent_normal_shadows"};
         case Effect::kScreenProbes:
-            return {"place_probes", "trace_probes", "probe_shadows", "integrate"};
+            return {"place_probes", "trace_probes", "probe_shadows", "integrate", "probe_visibility"};
         case Effect::kAdaptiveProbes:
             return {"place_probes", "trace_probes", "probe_shadows"};
         case Effect::kLightingPdf:
@@ -39,7 +39,7 @@ std::vector<std::string_view> passes_of(Effect effect) {
         case Effect::kBentNormal:
             return {"near_field", "bent_normal", "bent_normal_shadows", "integrate"};
         case Effect::kTemporal:
-            return {"accumulate"};
+            return {"accumulate", "outlines", "outline_shadows"};
     }
     return {};
 }
