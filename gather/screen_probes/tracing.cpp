@@ -63,10 +63,10 @@ struct WeightedDirection {
     float weight = 0.0f;  ///< Estimate of the mean cosine over the ray's texel, up to a factor.
 };
 
-/// A direction within the texel of a ray, by the cosine about the probe's normal (resampled: Talbot, Cline
+/// A direction within the texel of a ray, by the cosine about the shading normal (resampled: Talbot, Cline
 /// and Egbert, "Importance Resampling for Global Illumination", 2005). So a texel holds the mean light under
 /// the cosine, and its product with the mean cosine is the irradiance that came through it: no grazing light
-/// is taken for light from higher up, and what lies under the surface, which is the surface, does not count.
+/// is taken for light from higher up, and what lies under the horizon, which is the surface, does not count.
 WeightedDirection ray_direction(const ProbeRay& ray, int resolution, const Jitter& jitter,
                                 const glm::vec3& normal) {
     const auto edge = static_cast<float>(resolution << ray.level);
@@ -145,11 +145,12 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
                 const std::uint32_t probe_index = probe_of[batch.order[i] / texels];
                 const Probe& probe = atlas.probes[probe_index];
                 core::Ray ray;
+                const std::size_t pixel = in.visible.index(probe.pixel.x, probe.pixel.y);
                 const WeightedDirection chosen =
-                    ray_direction(choice, atlas.resolution, jitter, probe.normal);
+                    ray_direction(choice, atlas.resolution, jitter, in.visible.points[pixel].frame.normal);
                 ray.direction = chosen.direction;
                 batch.weights[i] = chosen.weight;
-                ray.origin = in.visible.origins[in.visible.index(probe.pixel.x, probe.pixel.y)];
+                ray.origin = in.visible.origins[pixel];
                 batch.keys[i] = core::hash_words(
                     pixel_key(in.inputs.seed, probe.pixel.x, probe.pixel.y, kProbeUse), choice.x, choice.y,
                     choice.level + 2u * static_cast<std::uint32_t>(probe.level));
@@ -167,7 +168,11 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
                 const ProbeRay& choice = batch.choice[batch.order[i]];
                 const std::size_t texel =
                     probe_of[batch.order[i] / texels] * texels + choice.texel(atlas.resolution);
-                glm::vec3 light = batch.radiance[i];
+                const Probe& probe = atlas.probes[probe_of[batch.order[i] / texels]];
+                // Over the shading normal's horizon and under the surface: nothing arrives from there.
+                const bool is_under =
+                    batch.weights[i] > 0.0f && !(glm::dot(batch.rays.get(i).direction, probe.normal) > 0.0f);
+                glm::vec3 light = is_under ? glm::vec3(0.0f) : batch.radiance[i];
                 const float bright = core::luminance(light);
                 brought[b] += static_cast<double>(bright);
                 if (in.settings.max_ray_intensity > 0.0f && bright > in.settings.max_ray_intensity) {

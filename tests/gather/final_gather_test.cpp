@@ -3,12 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <optional>
 
 #include "core/support/error.h"
 #include "core/support/parallel.h"
 #include "core/trace/triangle_tracer.h"
+#include "tests/support/analytic_scenes.h"
 #include "tests/support/gather_pictures.h"
+#include "tests/support/render_scenes.h"
 
 namespace {
 
@@ -22,16 +26,21 @@ core::Frame render(const core::Scene& scene, const gather::Settings& settings, c
 const char* const kAssets[] = {"cornell_box", "two_rooms", "thin_walls", "glossy", "instances"};
 
 TEST(FinalGather, PixelsAreTheSameAtAnyThreadCount) {
-    const core::Scene scene = tests::asset("glossy");
+    const core::Scene indoors = tests::asset("glossy");
+    core::Scene outdoors = indoors;
+    outdoors.lights.emplace_back(core::make_sun(0.5f, 0.7f, 20.0f, 0.01f));
+    outdoors.sky = tests::peaked_sky();
     gather::Settings settings;
     settings.frames = 3;
-    std::optional<core::Frame> first;
-    for (const int threads : {1, 2, 3, 8}) {
-        core::with_thread_limit(threads, [&] {
-            const core::Frame frame = render(scene, settings, "auto");
-            if (first) tests::expect_same_bits(frame.image, first->image);
-            first = frame;
-        });
+    for (const core::Scene* scene : {&indoors, static_cast<const core::Scene*>(&outdoors)}) {
+        std::optional<core::Frame> first;
+        for (const int threads : {1, 2, 3, 8}) {
+            core::with_thread_limit(threads, [&] {
+                const core::Frame frame = render(*scene, settings, "auto");
+                if (first) tests::expect_same_bits(frame.image, first->image);
+                first = frame;
+            });
+        }
     }
 }
 
@@ -126,6 +135,37 @@ TEST(FinalGather, SurfacesWithoutAProbeTraceTheirOwnRays) {
     const double traced = rim_light();
     settings.integrate.near_field = gather::NearField::kMultiBounce;
     EXPECT_LT(traced, 0.1 * rim_light());  // There the nearest probe does stand in.
+}
+
+/// A sunlit floor whose shading leans away from a lit curb: the curb is under the shading's horizon, and what
+/// is over it but under the floor is the floor. As to the path tracer, neither brings light.
+TEST(FinalGather, WhatLiesUnderEitherHorizonBringsNoLight) {
+    core::Mesh floor = tests::quad(4.0f, 4.0f);
+    std::fill(floor.normals.begin(), floor.normals.end(), glm::normalize(glm::vec3(1.0f, 0.0f, 1.0f)));
+    core::Scene scene = tests::scene_of(floor);
+    tests::add_instance(scene, tests::add_mesh(scene, tests::box(glm::vec3(0.1f, 2.0f, 0.5f))),
+                        tests::translation({-2.1, 0.0, 0.0}));
+    core::DirectionalLight sun;
+    sun.direction = glm::normalize(glm::vec3(-1.0f, 0.0f, -1.0f));
+    sun.illuminance = glm::vec3(10.0f);
+    scene.lights = {sun};
+    scene.cameras = {core::look_at({0.5, 0.0, 3.0}, {0.5, 0.0, 0.0}, {0.0, 1.0, 0.0}, 0.6)};
+    gather::Settings settings;
+    settings.frames = 4;
+    settings.screen_probes.spacing = 1;
+    settings.screen_probes.importance_sampling = false;
+    settings.screen_probes.spatial_filter = false;
+    settings.integrate.bent_normal = false;
+    settings.integrate.diffuse = gather::DiffuseIntegral::kSum;
+    const core::Frame frame = render(scene, settings, "all", 24, 18);
+    double indirect = 0.0;
+    double all = 0.0;
+    for (std::size_t i = 0; i < frame.image.pixel_count(); ++i) {
+        indirect += static_cast<double>((*frame.image.find("IndirectDiffuse.G"))[i]);
+        all += static_cast<double>((*frame.image.find("G"))[i]);
+    }
+    EXPECT_GT(all, 1.0);
+    EXPECT_LE(indirect, 1e-5 * all);
 }
 
 TEST(FinalGather, RefusesLayersItDoesNotKnow) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -32,6 +33,7 @@ struct GatherRequest {
     int height = 48;
     std::uint64_t seed = 3;
     std::set<std::string> aovs = {};
+    const core::Tracer* tracer = nullptr;  ///< Also of what is seen; null: triangles.
 };
 
 struct GatherPicture {
@@ -39,11 +41,12 @@ struct GatherPicture {
     core::Frame frame;
 };
 
-/// Gathers on triangles. @param effects as of `--effects`
+/// @param effects as of `--effects`
 inline GatherPicture gather_picture(const core::Scene& scene, const core::Camera& camera,
                                     const gather::Settings& settings, const std::string& effects,
                                     const GatherRequest& request = {}) {
-    const core::TriangleTracer tracer(scene);
+    std::optional<core::TriangleTracer> triangles;
+    const core::Tracer& tracer = request.tracer ? *request.tracer : triangles.emplace(scene);
     GatherPicture picture;
     picture.plan = gather::make_plan(scene, request.width, request.height, settings,
                                      gather::parse_effects(effects), request.aovs);

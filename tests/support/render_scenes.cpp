@@ -1,5 +1,8 @@
 #include "tests/support/render_scenes.h"
 
+#include <algorithm>
+#include <optional>
+
 #include "core/trace/triangle_tracer.h"
 #include "tests/support/analytic_scenes.h"
 
@@ -85,6 +88,16 @@ core::Scene area_lit_room() {
     return scene;
 }
 
+core::Sky peaked_sky() {
+    core::Image image(8, 4);
+    for (const char* channel : {"R", "G", "B"}) {
+        std::vector<float>& values = image.add_channel(channel);
+        std::fill(values.begin(), values.end(), 1.0f);
+        values[1 * 8 + 3] = 30.0f;
+    }
+    return core::Sky::latitude_longitude(image, 0.0f, "peaked");
+}
+
 core::Camera inside_camera() {
     return core::look_at({0.2, 0.1, 0.3}, {-0.5, -0.2, -0.8}, {0, 1, 0}, 1.2);
 }
@@ -94,7 +107,8 @@ core::Camera room_camera() {
 }
 
 core::Frame render(const core::Scene& scene, const core::Camera& camera, const RenderRequest& request) {
-    const core::TriangleTracer tracer(scene);
+    std::optional<core::TriangleTracer> triangles;
+    const core::Tracer& tracer = request.tracer ? *request.tracer : triangles.emplace(scene);
     core::PathTracer renderer({request.samples_per_pixel, request.bounces, request.light_sampling});
     return renderer.render({.scene = scene,
                             .camera = camera,

@@ -7,6 +7,7 @@
 
 #include "core/render/path_tracer.h"
 #include "core/scene/scene.h"
+#include "core/trace/tracer.h"
 
 namespace tests {
 
@@ -24,6 +25,9 @@ core::Scene mixed_room(float intensity = 1.0f);
 /// The same room with the area light alone.
 core::Scene area_lit_room();
 
+/// A sky of radiance 1 with a spot of half a steradian that is thirty times as bright.
+core::Sky peaked_sky();
+
 /// A camera inside a closed sphere, off centre.
 core::Camera inside_camera();
 core::Camera room_camera();
@@ -37,9 +41,10 @@ struct RenderRequest {
     bool light_sampling = true;
     std::set<std::string> aovs = {};
     double time_budget_seconds = 0.0;
+    const core::Tracer* tracer = nullptr;  ///< Also of what is seen; null: triangles.
 };
 
-/// Path-traces on triangles.
+/// Path-traces.
 core::Frame render(const core::Scene& scene, const core::Camera& camera, const RenderRequest& request = {});
 
 /// Mean of the beauty over pixels and channels.
