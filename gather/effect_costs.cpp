@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "gather/integrate/bent_normal.h"
+#include "gather/integrate/reflection_reuse.h"
 #include "gather/screen_probes/placement.h"
 #include "gather/screen_probes/probe_atlas.h"
 
@@ -35,7 +36,7 @@ std::vector<std::string_view> passes_of(Effect effect) {
         case Effect::kRoughSpecular:
             return {"integrate"};
         case Effect::kReflections:
-            return {"reflections", "reflection_shadows"};
+            return {"reflections", "reflection_shadows", "reflection_reuse"};
         case Effect::kBentNormal:
             return {"near_field", "bent_normal", "bent_normal_shadows", "integrate"};
         case Effect::kTemporal:
@@ -72,6 +73,9 @@ std::uint64_t bytes_of(Effect effect, const Plan& plan, int width, int height, c
             return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) * pixel +
                    (traced ? (uniform + adaptive) * edge * edge * kNearCopyBytes : 0);
         }
+        case Effect::kReflections:
+            return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
+                   static_cast<std::uint64_t>(settings.integrate.reflection_rays) * sizeof(ReflectionRay);
         default:  // They keep nothing of their own.
             return 0;
     }

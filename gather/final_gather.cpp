@@ -14,6 +14,7 @@
 #include "gather/effect_costs.h"
 #include "gather/integrate/bent_normal.h"
 #include "gather/integrate/integrate.h"
+#include "gather/integrate/reflection_reuse.h"
 #include "gather/integrate/reflections.h"
 #include "gather/lighting/outlines.h"
 #include "gather/lighting/scene_lighting.h"
@@ -137,6 +138,7 @@ private:
 
     VisibleSurfaces visible_;
     std::vector<glm::vec3> direct_, diffuse_, specular_;
+    ReflectionRays reflection_rays_;
     ProbeAtlas atlas_, last_atlas_;
     bool has_last_ = false;
     std::vector<ProbeWeights> weights_;
@@ -224,13 +226,18 @@ void Picture::gather_light(std::uint32_t frame) {
 }
 
 void Picture::trace_smooth(std::uint32_t frame) {
-    ReflectionRays rays;
+    ReflectionCost cost;
     ledger_.time("reflections", [&] {
-        rays =
-            trace_reflections(inputs_, visible_, mirrored_lighting_, settings_.integrate, frame, specular_);
-        return PassRays{rays.rays, rays.exhausted};
+        cost = trace_reflections(inputs_, visible_, mirrored_lighting_, settings_.integrate, frame,
+                                 reflection_rays_);
+        return PassRays{cost.rays, cost.exhausted};
     });
-    ledger_.time("reflection_shadows", [&] { return PassRays{rays.shadow_rays, 0}; });
+    ledger_.time("reflection_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
+    ledger_.time("reflection_reuse", [&] {
+        reuse_reflections(visible_, reflection_rays_, settings_.integrate,
+                          settings_.screen_probes.plane_sharpness, inputs_.seed, frame, specular_);
+        return PassRays{};
+    });
 }
 
 void Picture::remember_openness(std::uint32_t frame) {

@@ -148,6 +148,8 @@ const std::vector<Knob>& knobs() {
         number("integrate.reflection_roughness_max", kI, &I::reflection_roughness_max, 0.0f, 1.0f,
                "rougher surfaces reflect the probes"),
         number("integrate.reflection_rays", kI, &I::reflection_rays, 1, 64, "a smooth pixel a frame"),
+        number("integrate.reflection_neighbors", kI, &I::reflection_neighbors, 0, 64,
+               "whose rays a smooth pixel shares"),
         flag("integrate.bent_normal", kI, &I::bent_normal, "short rays restore contact shadows"),
         number("integrate.bent_normal_rays", kI, &I::bent_normal_rays, 1, 64, "a pixel a frame"),
         number("integrate.bent_normal_pixels", kI, &I::bent_normal_pixels, 1.0f, 64.0f,

@@ -73,6 +73,7 @@ struct IntegrateSettings {
     bool reflections = true;          ///< Smooth surfaces take rays of their own; off: they blur the probes.
     float reflection_roughness_max = 0.5f;  ///< Rougher ones reflect the probes. 0 ... 1.
     int reflection_rays = 1;                ///< A pixel of them a frame. 1 ... 64.
+    int reflection_neighbors = 8;           ///< Whose rays such a pixel shares. 0 ... 64.
     bool bent_normal = true;                ///< Short rays at full resolution restore contact shadows.
     int bent_normal_rays = 4;               ///< A pixel a frame. 1 ... 64.
     float bent_normal_pixels = 16.0f;       ///< Length of those rays on the screen. 1 ... 64.

@@ -147,10 +147,17 @@ BrdfSample sample_specular(const Brdf& brdf, const glm::vec3& outgoing, const gl
     const glm::vec3 incoming = 2.0f * glm::dot(outgoing, half) * half - outgoing;
     if (!(incoming.z > 0.0f)) return result;
     result.incoming = glm::normalize(incoming);
-    const glm::vec3 between = glm::normalize(outgoing + result.incoming);
-    result.value.specular = evaluate_with_half(brdf, outgoing, result.incoming, between).specular;
-    result.pdf = specular_pdf(brdf, outgoing, between);
+    const BrdfEvaluation evaluation = evaluate_specular(brdf, outgoing, result.incoming);
+    result.value = evaluation.value;
+    result.pdf = evaluation.pdf;
     return result;
+}
+
+BrdfEvaluation evaluate_specular(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming) {
+    if (!(outgoing.z > 0.0f) || !(incoming.z > 0.0f) || !has_specular(brdf)) return {};
+    const glm::vec3 half = glm::normalize(outgoing + incoming);
+    return {{glm::vec3(0.0f), evaluate_with_half(brdf, outgoing, incoming, half).specular},
+            specular_pdf(brdf, outgoing, half)};
 }
 
 glm::vec3 approximate_albedo(const Brdf& brdf) {

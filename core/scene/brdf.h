@@ -62,6 +62,9 @@ BrdfSample sample(const Brdf& brdf, const glm::vec3& outgoing, float u_lobe, con
 /// Of the specular lobe alone: `value.diffuse` is 0 and the pdf that of visible normals. @param u in [0, 1)^2
 BrdfSample sample_specular(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec2& u);
 
+/// What sample_specular() gives where it chooses `incoming`.
+BrdfEvaluation evaluate_specular(const Brdf& brdf, const glm::vec3& outgoing, const glm::vec3& incoming);
+
 /// Directional albedo used to describe a surface in the Albedo AOV: diffuse colour plus f0.
 glm::vec3 approximate_albedo(const Brdf& brdf);
 

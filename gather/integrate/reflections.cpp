@@ -1,6 +1,7 @@
 #include "gather/integrate/reflections.h"
 
 #include <atomic>
+#include <limits>
 
 #include "core/math/random.h"
 #include "core/support/parallel.h"
@@ -15,14 +16,13 @@ enum Dimension : std::uint32_t { kDirection, kAlpha };
 
 struct Reflected {
     core::RayStream rays;
-    std::vector<std::size_t> pixels;
+    std::vector<std::size_t> places;  ///< In the frame's rays.
     std::vector<std::uint32_t> keys;
-    std::vector<glm::vec3> weights;  ///< Of the light that comes back.
 };
 
 void sample(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
             const IntegrateSettings& settings, std::uint32_t frame, std::size_t first, std::size_t last,
-            Reflected& out) {
+            Reflected& out, std::vector<ReflectionRay>& found) {
     const auto width = static_cast<std::size_t>(visible.width);
     const auto rays = static_cast<std::uint32_t>(settings.reflection_rays);
     out.rays.resize((last - first) * rays);
@@ -42,14 +42,14 @@ void sample(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
             ray.direction = glm::normalize(point.frame.to_world(chosen.incoming));
             if (!(glm::dot(ray.direction, point.geometric_normal) > 0.0f)) continue;
             ray.seed = sequence.bits(kAlpha);
-            out.rays.set(out.pixels.size(), ray);
-            out.pixels.push_back(pixel);
+            out.rays.set(out.places.size(), ray);
+            out.places.push_back(pixel * rays + k);
             out.keys.push_back(core::hash_words(key, k));
-            out.weights.push_back(chosen.value.specular *
-                                  (chosen.incoming.z / (chosen.pdf * static_cast<float>(rays))));
+            found[out.places.back()].direction = ray.direction;
+            found[out.places.back()].pdf = chosen.pdf;
         }
     }
-    out.rays.resize(out.pixels.size());
+    out.rays.resize(out.places.size());
 }
 
 }  // namespace
@@ -58,29 +58,35 @@ bool takes_reflection_rays(const core::SurfacePoint& surface, const IntegrateSet
     return surface.roughness <= settings.reflection_roughness_max && core::has_specular(surface.brdf);
 }
 
-ReflectionRays trace_reflections(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
+ReflectionCost trace_reflections(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
                                  const HitLighting& hit_lighting, const IntegrateSettings& settings,
-                                 std::uint32_t frame, std::vector<glm::vec3>& specular) {
+                                 std::uint32_t frame, ReflectionRays& found) {
+    found.rays_a_pixel = static_cast<std::size_t>(settings.reflection_rays);
+    found.rays.assign(visible.depth.size() * found.rays_a_pixel, {});
     std::atomic<std::uint64_t> rays{0}, shadow_rays{0}, exhausted{0};
-    core::parallel_for(static_cast<std::size_t>(visible.height), kRowsAtOnce,
-                       [&](std::size_t begin, std::size_t end) {
-                           const core::ScopedFlushDenormals flush;
-                           const auto width = static_cast<std::size_t>(visible.width);
-                           Reflected found;
-                           sample(inputs, visible, settings, frame, begin * width, end * width, found);
-                           if (found.pixels.empty()) return;
-                           core::HitStream hits;
-                           inputs.tracer.trace_closest(found.rays, hits);
-                           std::vector<glm::vec3> radiance(found.pixels.size());
-                           const HitLightingCounters counters =
-                               hit_lighting.shade(found.rays, hits, found.keys, frame, radiance);
-                           for (std::size_t i = 0; i < found.pixels.size(); ++i) {
-                               specular[found.pixels[i]] += found.weights[i] * radiance[i];
-                           }
-                           rays += found.pixels.size();
-                           shadow_rays += counters.shadow_rays;
-                           exhausted += counters.exhausted;
-                       });
+    core::parallel_for(
+        static_cast<std::size_t>(visible.height), kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
+            const core::ScopedFlushDenormals flush;
+            const auto width = static_cast<std::size_t>(visible.width);
+            Reflected reflected;
+            sample(inputs, visible, settings, frame, begin * width, end * width, reflected, found.rays);
+            if (reflected.places.empty()) return;
+            core::HitStream hits;
+            inputs.tracer.trace_closest(reflected.rays, hits);
+            std::vector<glm::vec3> radiance(reflected.places.size());
+            const HitLightingCounters counters =
+                hit_lighting.shade(reflected.rays, hits, reflected.keys, frame, radiance);
+            for (std::size_t i = 0; i < reflected.places.size(); ++i) {
+                ReflectionRay& ray = found.rays[reflected.places[i]];
+                const core::Hit hit = hits.get(i);
+                ray.radiance = radiance[i];
+                ray.distance = hit.hit() ? hit.t : std::numeric_limits<float>::infinity();
+                ray.normal = hit.normal;
+            }
+            rays += reflected.places.size();
+            shadow_rays += counters.shadow_rays;
+            exhausted += counters.exhausted;
+        });
     return {rays, shadow_rays, exhausted};
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/render/renderer.h"
+#include "gather/integrate/reflection_reuse.h"
 #include "gather/lighting/scene_lighting.h"
 #include "gather/lighting/visible_surfaces.h"
 #include "gather/settings.h"
@@ -19,15 +20,15 @@ namespace gather {
 /// Whether a surface is smooth enough for rays of its own.
 bool takes_reflection_rays(const core::SurfacePoint& surface, const IntegrateSettings& settings);
 
-struct ReflectionRays {
+struct ReflectionCost {
     std::uint64_t rays = 0;
     std::uint64_t shadow_rays = 0;
     std::uint64_t exhausted = 0;
 };
 
-/// Adds to `specular` what the lobes of surfaces that takes_reflection_rays() reflect.
-ReflectionRays trace_reflections(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
+/// Traces `settings.reflection_rays` rays from each pixel that takes_reflection_rays().
+ReflectionCost trace_reflections(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
                                  const HitLighting& hit_lighting, const IntegrateSettings& settings,
-                                 std::uint32_t frame, std::vector<glm::vec3>& specular);
+                                 std::uint32_t frame, ReflectionRays& found);
 
 }  // namespace gather

@@ -66,7 +66,8 @@ enum PixelUse : std::uint32_t {
     kBentNormalUse,
     kVisibilityUse,
     kReflectionUse,
-    kOutlineUse
+    kOutlineUse,
+    kReflectionReuseUse
 };
 
 /// The camera ray through the sample of a pixel's film that has this index in its sequence.

@@ -2,6 +2,7 @@
 
 import array
 import pathlib
+import statistics
 import struct
 import zlib
 
@@ -54,13 +55,16 @@ def read_exr(path):
 
 
 def squared_bias(pictures, reference):
-    """measure.md's bias^2 as a relMSE: both variances subtracted. At least two pictures, of independent seeds."""
-    seeds, truth, total, count = [read_exr(picture) for picture in pictures], read_exr(reference), 0.0, 0
+    """measure.md's bias^2 as a relMSE, both variances subtracted, and its standard error if pixels are independent.
+
+    @param pictures at least two, of independent seeds
+    """
+    seeds, truth, errors = [read_exr(picture) for picture in pictures], read_exr(reference), []
     for channel in "RGB":
         columns = zip(truth[channel], truth["Variance." + channel], *(seed[channel] for seed in seeds))
         for right, variance, *values in columns:
             mean = sum(values) / len(values)
             own = sum((value - mean) ** 2 for value in values) / (len(values) - 1) / len(values)
-            total += ((mean - right) ** 2 - own - variance) / (right * right + 0.01)
-            count += 1
-    return total / count
+            errors.append(((mean - right) ** 2 - own - variance) / (right * right + 0.01))
+    mean = statistics.mean(errors)
+    return mean, statistics.stdev(errors, mean) / (len(errors) / 3) ** 0.5  # the channels are not independent

@@ -23,7 +23,7 @@ def add_options(parser):
     parser.add_argument("--threads", default="0")
     parser.add_argument("--cache", default=REFERENCES, help="folder that keeps the references")
     parser.add_argument("--views", help="names of tests/images/views.json with commas between; all by default")
-    parser.add_argument("--reference-spp", type=int, default=4096)
+    parser.add_argument("--reference-spp", type=int, help="16384 of truth, else 4096")
     parser.add_argument("--frames", type=int, default=16, help="--accumulate of the gather")
     parser.add_argument("--json", help="write the rows to this file")
     parser.add_argument("--readme", action="store_true", help="rewrite the tables between README.md's markers")

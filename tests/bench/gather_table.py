@@ -4,8 +4,8 @@
     tests/bench/gather_table.py budget|truth|ablation|effects|proof|speed [--views NAME,...] [--size WxH] [--readme] ...
 
 budget: equal time, by the renderer's clock and by the wall's. truth: cranked up, then each approximation back on;
-small by default (96x72, 16 frames, 4 seeds, the diffuse views of assets/), so that it can be run. ablation: each
-technique off alone, at equal probe rays. effects: auto against all on every scene. proof: a scene that each effect
+small by default (96x72, 16 frames, 8 seeds, of the ledger 4, references of 16,384 samples, the diffuse views of
+assets/), so that it can be run. ablation: each technique off alone, at equal probe rays. effects: auto against all on every scene. proof: a scene that each effect
 is needed in (320x240, 8 seeds). speed: medians by pass of a draft frame. Exit code 1 where a gate fails.
 Errors are relMSE without the reference's noise (and in truth without the gather's), FLIP, energy bias in %.
 """
@@ -26,7 +26,7 @@ from shared_scenes import scene_files
 TRUTH = {"screen_probes__spacing": 1, "screen_probes__resolution": 16, "screen_probes__importance_sampling": "off",
          "screen_probes__spatial_filter": "off", "screen_probes__jitter_interpolation": "off",
          "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16,
-         "lighting__hit_roughness_min": 0, "film__outline_samples": 1}
+         "lighting__hit_roughness_min": 0, "film__outline_samples": 1, "integrate__reflection_neighbors": 0}
 LEDGER = {
     "SH3": {"integrate__diffuse": "sh"},
     "filter": {"screen_probes__spatial_filter": "on"},
@@ -39,12 +39,14 @@ LEDGER = {
     "spacing 16": {"screen_probes__spacing": 16},
     "resolution 8": {"screen_probes__resolution": 8},
 }
+LEDGER_SEEDS = 4
 TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "screen_probes__lighting_pdf",
               "screen_probes__spatial_filter", "screen_probes__clamp_hit_distance", "integrate__bent_normal",
               "screen_probes__jitter_placement", "screen_probes__jitter_directions",
               "screen_probes__jitter_interpolation", "temporal__accumulate", "integrate__rough_specular",
-              "screen_probes__probe_visibility", "integrate__reflections", "film__outline_samples"]
-OFF = {"film__outline_samples": 1}  # What is not a switch.
+              "screen_probes__probe_visibility", "integrate__reflections", "integrate__reflection_neighbors",
+              "film__outline_samples"]
+OFF = {"film__outline_samples": 1, "integrate__reflection_neighbors": 0}  # What is not a switch.
 PROBE_PASSES = ("place_probes", "near_field", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
 
 
@@ -136,15 +138,17 @@ def truth(run, options):
         cases += [("triangle", name, change) for name, change in LEDGER.items() if not options.no_ledger]
         for tracer, name, change in cases:
             reference = run.reference(view, tracer)
+            seeds = options.seeds if name == "truth" else min(options.seeds, LEDGER_SEEDS)
             pictures = [run.gather(view, *setting(**{**TRUTH, **change}), tracer=tracer, seed=seed)[0]
-                        for seed in range(1, options.seeds + 1)]
-            error = squared_bias(pictures, reference)
+                        for seed in range(1, seeds + 1)]
+            error, deviation = squared_bias(pictures, reference)
             bias = statistics.mean(run.compare(picture, reference)["energy_bias"] for picture in pictures)
-            records.append({"scene": view["name"], "tracer": tracer, "case": name, "rel_mse": error, "bias": bias})
-            rows.append([view["name"], tracer, name, f"{error:.2e}", f"{bias:+.3f} %"])
+            records.append({"scene": view["name"], "tracer": tracer, "case": name, "rel_mse": error,
+                            "standard_error": deviation, "bias": bias})
+            rows.append([view["name"], tracer, name, f"{error:.1e}", f"{deviation:.1e}", f"{bias:+.3f} %"])
             if name == "truth" and view["diffuse"] and (error > 5e-4 or abs(bias) > 0.5):
                 failed.append(f"{view['name']}, {tracer}: relMSE {error:.2e}, bias {bias:+.3f} %")
-    return table(["scene", "tracer", "settings", "relMSE, both variances subtracted", "bias"], rows), records, failed
+    return table(["scene", "tracer", "settings", "relMSE, both variances subtracted", "standard error", "bias"], rows), records, failed
 
 
 def ablation(run, options):
@@ -287,7 +291,7 @@ def main():
                 "speed": speed}
     parser.add_argument("what", choices=commands)
     add_options(parser)
-    parser.add_argument("--seeds", type=int, help="4 of truth (at least 2), 8 of proof")
+    parser.add_argument("--seeds", type=int, help="8 of truth (at least 2) and of proof")
     parser.add_argument("--no-ledger", action="store_true", help="of truth: its gate alone")
     parser.add_argument("--no-sdf", action="store_true", help="of truth: triangles alone")
     parser.add_argument("--only", help="of proof: effects with commas between")
@@ -295,7 +299,8 @@ def main():
     options = parser.parse_args()
     options.size = options.size or {"truth": "96x72", "effects": "64x48", "proof": "320x240",
                                     "speed": "1280x720"}.get(options.what, "640x360")
-    options.seeds = options.seeds or (8 if options.what == "proof" else 4)
+    options.seeds = options.seeds or 8
+    options.reference_spp = options.reference_spp or (16384 if options.what == "truth" else 4096)
     if options.what == "truth" and options.seeds < 2:
         parser.error("--seeds is at least 2")
     with tempfile.TemporaryDirectory() as folder:

@@ -134,43 +134,81 @@ gather::Settings few_frames() {
     return settings;
 }
 
-/// A wall of smooth metal shows the room: the path tracer's picture, which blurred probes do not give.
-TEST(Reflections, MirrorsShowWhatThePathTracerSees) {
+/// A room with a point light, whose green wall is metal.
+core::Scene metal_walled_room(float roughness) {
     core::Scene scene = tests::area_lit_room();
     scene.instances.pop_back();  // The lamp, whose spot on the ceiling is all noise.
     scene.lights.emplace_back(core::PointLight{"lamp", {0.0f, 0.3f, 0.7f}, glm::vec3(1.0f)});
     for (core::Material& material : scene.materials) {
         if (material.base_color.g < 2.0f * material.base_color.r) continue;
-        material.metallic = 1.0f;  // The green wall.
-        material.roughness = 0.15f;
+        material.metallic = 1.0f;
+        material.roughness = roughness;
     }
-    const core::Camera camera = tests::room_camera();
-    const std::set<std::string> layers = {"IndirectSpecular"};
-    const core::Frame truth = tests::render(
-        scene, camera, {.width = 64, .height = 48, .samples_per_pixel = 1024, .bounces = 1, .aovs = layers});
-    gather::Settings settings = few_frames();
-    const auto reflected = [&](const core::Frame& frame) { return frame.image.find("IndirectSpecular.G"); };
-    const auto error = [&] {
-        const core::Frame frame =
-            tests::gather_picture(scene, camera, settings, "auto", {.aovs = layers}).frame;
+    return scene;
+}
+
+/// What the metal wall reflects, against the path tracer.
+struct ReflectionError {
+    double squares = 0.0;  ///< Sum over pixels.
+    double energy = 0.0;   ///< Of the truth's.
+};
+
+class MetalWall {
+public:
+    explicit MetalWall(float roughness)
+        : scene_(metal_walled_room(roughness)),
+          truth_(tests::render(scene_, tests::room_camera(),
+                               {.width = 160,
+                                .height = 120,
+                                .samples_per_pixel = 256,
+                                .bounces = 1,
+                                .aovs = {"IndirectSpecular"}})) {}
+
+    ReflectionError error(const gather::Settings& settings) const {
+        const core::Frame frame = tests::gather_picture(scene_, tests::room_camera(), settings, "auto",
+                                                        {.width = 160, .height = 120, .aovs = {"IndirectSpecular"}})
+                                      .frame;
+        const std::vector<float>& mine = *frame.image.find("IndirectSpecular.G");
+        const std::vector<float>& truth = *truth_.image.find("IndirectSpecular.G");
+        ReflectionError result;
         double sum = 0.0;
-        double truth_sum = 0.0;
-        double squares = 0.0;
-        for (std::size_t i = 0; i < frame.image.pixel_count(); ++i) {
-            const auto a = static_cast<double>((*reflected(frame))[i]);
-            const auto b = static_cast<double>((*reflected(truth))[i]);
-            sum += a;
-            truth_sum += b;
-            squares += (a - b) * (a - b);
+        for (std::size_t i = 0; i < mine.size(); ++i) {
+            const auto a = static_cast<double>(mine[i]);
+            const auto b = static_cast<double>(truth[i]);
+            result.energy += a;
+            sum += b;
+            result.squares += (a - b) * (a - b);
         }
-        if (settings.integrate.reflections) {
-            EXPECT_NEAR(sum / truth_sum, 1.0, 0.01);
-        }
-        return squares;
-    };
-    const double traced = error();
+        result.energy /= sum;
+        return result;
+    }
+
+private:
+    core::Scene scene_;
+    core::Frame truth_;
+};
+
+/// The path tracer's picture, which blurred probes do not give.
+TEST(Reflections, MirrorsShowWhatThePathTracerSees) {
+    const MetalWall wall(0.15f);
+    gather::Settings settings = few_frames();
+    const ReflectionError traced = wall.error(settings);
+    EXPECT_NEAR(traced.energy, 1.0, 0.01);
     settings.integrate.reflections = false;
-    EXPECT_LT(traced, 0.2 * error());
+    EXPECT_LT(traced.squares, 0.2 * wall.error(settings).squares);
+}
+
+/// Neighbours' rays take noise away, and neither bring light nor take it.
+TEST(Reflections, RaysAreSharedAmongNeighbors) {
+    const MetalWall wall(0.4f);
+    gather::Settings settings;
+    settings.frames = 2;
+    settings.integrate.reflection_neighbors = 0;
+    const ReflectionError alone = wall.error(settings);
+    settings.integrate.reflection_neighbors = 8;
+    const ReflectionError shared = wall.error(settings);
+    EXPECT_LT(shared.squares, 0.5 * alone.squares);
+    EXPECT_NEAR(shared.energy / alone.energy, 1.0, 0.01);
 }
 
 /// Coverage of a bright ball in the dark, against many samples of the film.

@@ -46,6 +46,7 @@ gather::Settings truth_mode() {
     settings.screen_probes.spatial_filter = false;
     settings.integrate.bent_normal = false;
     settings.integrate.diffuse = gather::DiffuseIntegral::kSum;
+    settings.integrate.reflection_neighbors = 0;
     return settings;
 }
 
