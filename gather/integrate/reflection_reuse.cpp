@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <vector>
 
 #include "core/image/image.h"
 #include "core/math/random.h"
@@ -68,73 +69,117 @@ struct Borrower {
 /// What one of the pixel's own rays reflects.
 glm::vec3 reflected(const Borrower& pixel, const ReflectionRay& ray) {
     const glm::vec3 incoming = pixel.point.frame.to_local(ray.direction);
-    const glm::vec3 value =
-        core::evaluate_specular(pixel.point.brdf, pixel.outgoing, incoming).value.specular;
-    return value * (incoming.z / ray.pdf) * ray.radiance;
+    // Value and pdf from one half vector: of a mirror both are huge, and their ratio is not.
+    const core::BrdfEvaluation lobe = core::evaluate_specular(pixel.point.brdf, pixel.outgoing, incoming);
+    if (!(lobe.pdf > 0.0f)) return glm::vec3(0.0f);
+    return lobe.value.specular * (incoming.z / lobe.pdf) * ray.radiance;
 }
+
+/// Where neighbours stand before a pixel turns them: like a sunflower's seeds.
+std::vector<glm::vec2> neighbor_offsets(int count) {
+    constexpr float kGoldenAngle = 2.3999632f;
+    std::vector<glm::vec2> offsets;
+    for (int i = 0; i < count; ++i) {
+        const float radius = kRadius * std::sqrt((static_cast<float>(i) + 0.5f) / static_cast<float>(count));
+        const float angle = kGoldenAngle * static_cast<float>(i);
+        offsets.push_back(radius * glm::vec2(std::cos(angle), std::sin(angle)));
+    }
+    return offsets;
+}
+
+class Reuse {
+public:
+    Reuse(const VisibleSurfaces& visible, const ReflectionRays& rays, const IntegrateSettings& settings,
+          float plane_sharpness, std::uint64_t seed, std::uint32_t frame)
+        : visible_(visible),
+          rays_(rays),
+          settings_(settings),
+          plane_sharpness_(plane_sharpness),
+          seed_(seed),
+          frame_(frame),
+          offsets_(neighbor_offsets(settings.reflection_neighbors)) {}
+
+    bool takes_part(std::size_t pixel) const {
+        return visible_.surface(pixel) && takes_reflection_rays(visible_.points[pixel], settings_);
+    }
+
+    /// @pre takes_part(pixel)
+    glm::vec3 light_of(std::size_t pixel) const {
+        const core::SurfacePoint& point = visible_.points[pixel];
+        const float reach = kRadius * visible_.footprint.at(visible_.depth[pixel]);
+        Borrower borrower{point, point.frame.to_local(visible_.outgoing[pixel]), kFarther * reach};
+        glm::vec3 near(0.0f);
+        int far_count = 0;
+        for (const ReflectionRay& ray : rays_of(pixel)) {
+            if (!(ray.pdf > 0.0f)) continue;
+            const glm::vec3 light = reflected(borrower, ray);
+            if (borrower.is_far(ray)) {
+                ++far_count;
+                borrower.light += light;
+                borrower.credit += 1.0f;
+            } else {
+                near += light;
+            }
+        }
+        const auto count = static_cast<float>(rays_.rays_a_pixel);
+        if (far_count == 0) return near / count;
+        if (!(point.brdf.alpha < kLeastAlpha)) borrow(pixel, reach, borrower);
+        return (near + static_cast<float>(far_count) / borrower.credit * borrower.light) / count;
+    }
+
+private:
+    std::span<const ReflectionRay> rays_of(std::size_t pixel) const {
+        return {rays_.rays.data() + pixel * rays_.rays_a_pixel, rays_.rays_a_pixel};
+    }
+
+    void borrow(std::size_t pixel, float reach, Borrower& borrower) const {
+        const auto width = static_cast<std::size_t>(visible_.width);
+        const glm::ivec2 at(pixel % width, pixel / width);
+        const core::SampleSequence sequence(pixel_key(seed_, at.x, at.y, kReflectionReuseUse), frame_);
+        const float angle = 2.0f * core::kPi * sequence.point(0).x;
+        const glm::vec2 turn(std::cos(angle), std::sin(angle));
+        for (const glm::vec2& offset : offsets_) {
+            const glm::vec2 turned(turn.x * offset.x - turn.y * offset.y,
+                                   turn.x * offset.y + turn.y * offset.x);
+            const glm::ivec2 there = at + glm::ivec2(glm::round(turned));
+            if (there == at || there.x < 0 || there.y < 0 || there.x >= visible_.width ||
+                there.y >= visible_.height) {
+                continue;
+            }
+            const std::size_t other = visible_.index(there.x, there.y);
+            if (!takes_part(other)) continue;
+            const core::SurfacePoint& lender = visible_.points[other];
+            const glm::vec3 apart = lender.position - borrower.point.position;
+            if (glm::dot(apart, apart) > reach * reach) continue;
+            if (surface_weight(borrower.point.position, borrower.point.geometric_normal,
+                               visible_.depth[pixel], lender.position, lender.geometric_normal,
+                               plane_sharpness_) < kSameSurface) {
+                continue;
+            }
+            for (const ReflectionRay& ray : rays_of(other)) {
+                if (borrower.is_far(ray)) borrower.add(visible_.origins[other], ray);
+            }
+        }
+    }
+
+    const VisibleSurfaces& visible_;
+    const ReflectionRays& rays_;
+    const IntegrateSettings& settings_;
+    float plane_sharpness_;
+    std::uint64_t seed_;
+    std::uint32_t frame_;
+    std::vector<glm::vec2> offsets_;
+};
 
 }  // namespace
 
 void reuse_reflections(const VisibleSurfaces& visible, const ReflectionRays& rays,
                        const IntegrateSettings& settings, float plane_sharpness, std::uint64_t seed,
                        std::uint32_t frame, std::vector<glm::vec3>& specular) {
-    const std::size_t count = rays.rays_a_pixel;
-    const auto width = static_cast<std::size_t>(visible.width);
+    const Reuse reuse(visible, rays, settings, plane_sharpness, seed, frame);
     core::parallel_for(visible.depth.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
-            if (!visible.surface(pixel) || !takes_reflection_rays(visible.points[pixel], settings)) continue;
-            const core::SurfacePoint& point = visible.points[pixel];
-            const float reach = kRadius * visible.footprint.at(visible.depth[pixel]);
-            Borrower borrower{point, point.frame.to_local(visible.outgoing[pixel]), kFarther * reach};
-            const std::span<const ReflectionRay> own(rays.rays.data() + pixel * count, count);
-            glm::vec3 sum(0.0f);
-            int far_count = 0;
-            for (const ReflectionRay& ray : own) {
-                if (!(ray.pdf > 0.0f)) continue;
-                const glm::vec3 light = reflected(borrower, ray);
-                if (borrower.is_far(ray)) {
-                    ++far_count;
-                    borrower.light += light;
-                    borrower.credit += 1.0f;
-                } else {
-                    sum += light;
-                }
-            }
-            const int neighbors =
-                point.brdf.alpha < kLeastAlpha || far_count == 0 ? 0 : settings.reflection_neighbors;
-            const glm::ivec2 at(pixel % width, pixel / width);
-            // A sunflower's seeds, turned at random.
-            const float turn =
-                2.0f * core::kPi *
-                core::SampleSequence(pixel_key(seed, at.x, at.y, kReflectionReuseUse), frame).point(0).x;
-            for (int i = 0; i < neighbors; ++i) {
-                constexpr float kGoldenAngle = 2.3999632f;
-                const float radius =
-                    kRadius * std::sqrt((static_cast<float>(i) + 0.5f) / static_cast<float>(neighbors));
-                const float angle = turn + kGoldenAngle * static_cast<float>(i);
-                const glm::ivec2 there =
-                    at + glm::ivec2(glm::round(radius * glm::vec2(std::cos(angle), std::sin(angle))));
-                if (there == at || there.x < 0 || there.y < 0 || there.x >= visible.width ||
-                    there.y >= visible.height) {
-                    continue;
-                }
-                const std::size_t other = visible.index(there.x, there.y);
-                if (!visible.surface(other) || !takes_reflection_rays(visible.points[other], settings))
-                    continue;
-                const core::SurfacePoint& lender = visible.points[other];
-                if (surface_weight(point.position, point.geometric_normal, visible.depth[pixel],
-                                   lender.position, lender.geometric_normal,
-                                   plane_sharpness) < kSameSurface) {
-                    continue;
-                }
-                const glm::vec3 apart = lender.position - point.position;
-                if (glm::dot(apart, apart) > reach * reach) continue;
-                for (const ReflectionRay& ray : std::span(rays.rays.data() + other * count, count)) {
-                    if (borrower.is_far(ray)) borrower.add(visible.origins[other], ray);
-                }
-            }
-            if (far_count > 0) sum += static_cast<float>(far_count) / borrower.credit * borrower.light;
-            specular[pixel] += sum / static_cast<float>(count);
+            if (reuse.takes_part(pixel)) specular[pixel] += reuse.light_of(pixel);
         }
     });
 }

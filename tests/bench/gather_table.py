@@ -148,7 +148,10 @@ def truth(run, options):
             rows.append([view["name"], tracer, name, f"{error:.1e}", f"{deviation:.1e}", f"{bias:+.3f} %"])
             if name == "truth" and view["diffuse"] and (error > 5e-4 or abs(bias) > 0.5):
                 failed.append(f"{view['name']}, {tracer}: relMSE {error:.2e}, bias {bias:+.3f} %")
-    return table(["scene", "tracer", "settings", "relMSE, both variances subtracted", "standard error", "bias"], rows), records, failed
+    text = table(["scene", "tracer", "settings", "relMSE, both variances subtracted", "standard error", "bias"], rows)
+    return text + (f"\n\nAt {options.size}, {options.frames} frames, {options.seeds} seeds (of the ledger at most "
+                   f"{LEDGER_SEEDS}), reference {options.reference_spp:,} samples; fields against the path tracer on "
+                   "fields."), records, failed
 
 
 def ablation(run, options):
