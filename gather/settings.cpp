@@ -197,14 +197,14 @@ Settings quality_settings(std::string_view quality) {
         settings.lighting.direct_samples = 1;
         settings.screen_probes.jitter_interpolation = true;  // Few frames show the grid otherwise.
         settings.screen_probes.adaptive_budget = 0.25f;
-        settings.integrate.specular_directions = 1;
+        settings.integrate.specular_directions = 2;
         settings.integrate.bent_normal_rays = 2;
     } else if (quality == "high" || quality == "ultra") {
         const bool ultra = quality == "ultra";
         settings.frames = ultra ? 64 : 32;
         settings.screen_probes.spacing = 8;
         settings.screen_probes.resolution = ultra ? 16 : 8;
-        settings.integrate.specular_directions = ultra ? 8 : 4;
+        settings.integrate.specular_directions = ultra ? 16 : 8;
         settings.integrate.reflection_rays = ultra ? 4 : 2;
         settings.integrate.bent_normal_rays = ultra ? 8 : 4;
     } else {

@@ -68,7 +68,7 @@ enum class NearField {
 struct IntegrateSettings {
     DiffuseIntegral diffuse = DiffuseIntegral::kSh;
     bool rough_specular = true;       ///< Reflects the probes in GGX directions; off: by harmonics.
-    int specular_directions = 2;      ///< A pixel a frame. 1 ... 64.
+    int specular_directions = 8;      ///< A pixel a frame. 1 ... 64.
     float rough_specular_max = 0.8f;  ///< Rougher ones reflect by harmonics. 0 ... 1.
     bool reflections = true;          ///< Smooth surfaces take rays of their own; off: they blur the probes.
     float reflection_roughness_max = 0.5f;  ///< Rougher ones reflect the probes. 0 ... 1.

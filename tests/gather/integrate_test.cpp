@@ -165,9 +165,10 @@ public:
                                 .aovs = {"IndirectSpecular"}})) {}
 
     ReflectionError error(const gather::Settings& settings) const {
-        const core::Frame frame = tests::gather_picture(scene_, tests::room_camera(), settings, "auto",
-                                                        {.width = 160, .height = 120, .aovs = {"IndirectSpecular"}})
-                                      .frame;
+        const core::Frame frame =
+            tests::gather_picture(scene_, tests::room_camera(), settings, "auto",
+                                  {.width = 160, .height = 120, .aovs = {"IndirectSpecular"}})
+                .frame;
         const std::vector<float>& mine = *frame.image.find("IndirectSpecular.G");
         const std::vector<float>& truth = *truth_.image.find("IndirectSpecular.G");
         ReflectionError result;
