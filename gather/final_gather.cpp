@@ -234,8 +234,7 @@ void Picture::trace_smooth(std::uint32_t frame) {
     });
     ledger_.time("reflection_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
     ledger_.time("reflection_reuse", [&] {
-        reuse_reflections(visible_, reflection_rays_, settings_.integrate,
-                          settings_.screen_probes.plane_sharpness, inputs_.seed, frame, specular_);
+        reuse_reflections(visible_, reflection_rays_, settings_.integrate, inputs_.seed, frame, specular_);
         return PassRays{};
     });
 }

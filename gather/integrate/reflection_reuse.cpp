@@ -9,7 +9,6 @@
 #include "core/math/random.h"
 #include "core/support/parallel.h"
 #include "gather/integrate/reflections.h"
-#include "gather/screen_probes/interpolation.h"
 
 namespace gather {
 
@@ -20,8 +19,8 @@ constexpr std::size_t kPixelsAtOnce = 1024;
 /// A borrowed ray counts for no more own ones than this.
 constexpr float kMostCredit = 2.0f;
 
-/// Neighbours lend where their surface weight is at least this.
-constexpr float kSameSurface = 0.5f;
+/// Neighbours lend that are no farther off the plane, of their greatest distance. Their lobes may be others.
+constexpr float kOffPlane = 0.1f;
 
 /// Smoother surfaces keep to themselves: their neighbours' rays would hardly count.
 constexpr float kLeastAlpha = 0.01f;
@@ -42,12 +41,12 @@ struct Borrower {
 
     bool is_far(const ReflectionRay& ray) const { return ray.pdf > 0.0f && ray.distance >= far_distance; }
 
-    /// @param from where the ray begins
-    void add(const glm::vec3& from, const ReflectionRay& ray) {
+    /// @param apart from the point to where the ray begins
+    void add(const glm::vec3& apart, const ReflectionRay& ray) {
         glm::vec3 direction = ray.direction;
         float pdf = ray.pdf;
         if (std::isfinite(ray.distance)) {
-            const glm::vec3 way = from - point.position + ray.distance * ray.direction;
+            const glm::vec3 way = apart + ray.distance * ray.direction;
             const float distance2 = glm::dot(way, way);
             direction = way / std::sqrt(distance2);
             const float cosine = std::abs(glm::dot(ray.normal, direction));
@@ -90,11 +89,10 @@ std::vector<glm::vec2> neighbor_offsets(int count) {
 class Reuse {
 public:
     Reuse(const VisibleSurfaces& visible, const ReflectionRays& rays, const IntegrateSettings& settings,
-          float plane_sharpness, std::uint64_t seed, std::uint32_t frame)
+          std::uint64_t seed, std::uint32_t frame)
         : visible_(visible),
           rays_(rays),
           settings_(settings),
-          plane_sharpness_(plane_sharpness),
           seed_(seed),
           frame_(frame),
           offsets_(neighbor_offsets(settings.reflection_neighbors)) {}
@@ -147,17 +145,11 @@ private:
                 continue;
             }
             const std::size_t other = visible_.index(there.x, there.y);
-            if (!takes_part(other)) continue;
-            const core::SurfacePoint& lender = visible_.points[other];
-            const glm::vec3 apart = lender.position - borrower.point.position;
+            const glm::vec3 apart = visible_.origins[other] - borrower.point.position;
             if (glm::dot(apart, apart) > reach * reach) continue;
-            if (surface_weight(borrower.point.position, borrower.point.geometric_normal,
-                               visible_.depth[pixel], lender.position, lender.geometric_normal,
-                               plane_sharpness_) < kSameSurface) {
-                continue;
-            }
+            if (std::abs(glm::dot(apart, borrower.point.geometric_normal)) > kOffPlane * reach) continue;
             for (const ReflectionRay& ray : rays_of(other)) {
-                if (borrower.is_far(ray)) borrower.add(visible_.origins[other], ray);
+                if (borrower.is_far(ray)) borrower.add(apart, ray);
             }
         }
     }
@@ -165,7 +157,6 @@ private:
     const VisibleSurfaces& visible_;
     const ReflectionRays& rays_;
     const IntegrateSettings& settings_;
-    float plane_sharpness_;
     std::uint64_t seed_;
     std::uint32_t frame_;
     std::vector<glm::vec2> offsets_;
@@ -174,9 +165,9 @@ private:
 }  // namespace
 
 void reuse_reflections(const VisibleSurfaces& visible, const ReflectionRays& rays,
-                       const IntegrateSettings& settings, float plane_sharpness, std::uint64_t seed,
-                       std::uint32_t frame, std::vector<glm::vec3>& specular) {
-    const Reuse reuse(visible, rays, settings, plane_sharpness, seed, frame);
+                       const IntegrateSettings& settings, std::uint64_t seed, std::uint32_t frame,
+                       std::vector<glm::vec3>& specular) {
+    const Reuse reuse(visible, rays, settings, seed, frame);
     core::parallel_for(visible.depth.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
             if (reuse.takes_part(pixel)) specular[pixel] += reuse.light_of(pixel);

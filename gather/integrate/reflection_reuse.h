@@ -35,7 +35,7 @@ struct ReflectionRays {
 
 /// Adds to `specular` the light of each pixel's own rays and of its neighbours'.
 void reuse_reflections(const VisibleSurfaces& visible, const ReflectionRays& rays,
-                       const IntegrateSettings& settings, float plane_sharpness, std::uint64_t seed,
-                       std::uint32_t frame, std::vector<glm::vec3>& specular);
+                       const IntegrateSettings& settings, std::uint64_t seed, std::uint32_t frame,
+                       std::vector<glm::vec3>& specular);
 
 }  // namespace gather
