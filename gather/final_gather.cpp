@@ -118,6 +118,7 @@ public:
 
 private:
     void gather_light(std::uint32_t frame);
+    SpecularReaders specular_readers() const;
     void trace_smooth(std::uint32_t frame);
     void remember_openness(std::uint32_t frame);
     FramePixel frame_pixel(std::size_t pixel) const;
@@ -162,18 +163,17 @@ void Picture::gather_light(std::uint32_t frame) {
     });
     ProbeTraceCost cost;
     ledger_.time("trace_probes", [&] {
-        cost = trace_probes(
-            {.inputs = inputs_,
-             .visible = visible_,
-             .lighting = lighting_,
-             .hit_lighting = hit_lighting_,
-             .table = table_,
-             .settings = probes,
-             .last = has_last_ ? &last_atlas_ : nullptr,
-             .cull = probes.importance_sampling && filtered,
-             .specular_roughness_max = directional ? settings_.integrate.rough_specular_max : -1.0f,
-             .frame = frame},
-            atlas_);
+        cost = trace_probes({.inputs = inputs_,
+                             .visible = visible_,
+                             .lighting = lighting_,
+                             .hit_lighting = hit_lighting_,
+                             .table = table_,
+                             .settings = probes,
+                             .last = has_last_ ? &last_atlas_ : nullptr,
+                             .cull = probes.importance_sampling && filtered,
+                             .specular_readers = directional ? specular_readers() : SpecularReaders{},
+                             .frame = frame},
+                            atlas_);
         return PassRays{cost.probe_rays, cost.exhausted};
     });
     ledger_.time("probe_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
@@ -223,6 +223,12 @@ void Picture::gather_light(std::uint32_t frame) {
         return PassRays{};
     });
     if (plan_.on(Effect::kReflections)) trace_smooth(frame);
+}
+
+SpecularReaders Picture::specular_readers() const {
+    const IntegrateSettings& integrate = settings_.integrate;
+    const float mirrored = plan_.on(Effect::kReflections) ? integrate.reflection_roughness_max : -1.0f;
+    return {.above = mirrored, .most = integrate.rough_specular_max};
 }
 
 void Picture::trace_smooth(std::uint32_t frame) {

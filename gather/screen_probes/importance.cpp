@@ -62,8 +62,21 @@ void choose_rays(std::span<const float> brdf, std::span<const float> light, floa
     }
 }
 
+namespace {
+
+/// What the specular lobe reflects over what the diffuse one does, at most 1. @param cosine of the outgoing
+/// direction
+float specular_share(const core::Brdf& brdf, float cosine) {
+    const float m = 1.0f - std::clamp(cosine, 0.0f, 1.0f);
+    const glm::vec3 specular = brdf.f0 + (brdf.f90 - brdf.f0) * (m * m * m * m * m);
+    const float diffuse = core::luminance(brdf.diffuse);
+    return std::min(1.0f, core::luminance(specular) / std::max(diffuse, std::numeric_limits<float>::min()));
+}
+
+}  // namespace
+
 core::Sh accumulate_brdf(const VisibleSurfaces& visible, const Probe& probe, int spacing,
-                         float plane_sharpness, float specular_roughness_max) {
+                         float plane_sharpness, const SpecularReaders& readers) {
     core::Sh sum{};
     float total = 0.0f;
     const auto add = [&](const glm::vec3& direction, float weight) {
@@ -80,8 +93,10 @@ core::Sh accumulate_brdf(const VisibleSurfaces& visible, const Probe& probe, int
         if (!(weight > 0.01f)) return;
         total += weight;
         add(point.frame.normal, weight);
-        if (point.roughness <= specular_roughness_max) {
-            add(glm::reflect(-visible.outgoing[pixel], point.frame.normal), weight);
+        if (readers.contains(point)) {
+            const float share =
+                specular_share(point.brdf, glm::dot(point.frame.normal, visible.outgoing[pixel]));
+            add(glm::reflect(-visible.outgoing[pixel], point.frame.normal), weight * share);
         }
     };
     consider(probe.pixel.x, probe.pixel.y);

@@ -36,10 +36,21 @@ std::vector<ProbeRay> uniform_rays(int resolution);
 void choose_rays(std::span<const float> brdf, std::span<const float> light, float cull_threshold,
                  std::span<ProbeRay> rays);
 
-/// Coefficients of the clamped cosine averaged over the pixels that will read a probe; with
-/// `specular_roughness_max` > 0 also about the mirror direction of pixels smoother than that.
+/// Whose specular lobes read the probes in their own directions: surfaces rougher than `above`, and no
+/// rougher than `most`. None by default.
+struct SpecularReaders {
+    float above = -1.0f;
+    float most = -1.0f;
+
+    bool contains(const core::SurfacePoint& surface) const {
+        return surface.roughness > above && surface.roughness <= most && core::has_specular(surface.brdf);
+    }
+};
+
+/// Coefficients of the clamped cosine averaged over the pixels that will read a probe; about the mirror
+/// direction, too, for `readers`, by what their specular lobe reflects beside the diffuse one.
 core::Sh accumulate_brdf(const VisibleSurfaces& visible, const Probe& probe, int spacing,
-                         float plane_sharpness, float specular_roughness_max);
+                         float plane_sharpness, const SpecularReaders& readers);
 
 /// What the last frame's probes say of the light that arrives at a probe: luminance by texel with mean 1;
 /// empty where none of them lies in its plane, or all are dark.

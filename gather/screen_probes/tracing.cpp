@@ -88,7 +88,7 @@ WeightedDirection ray_direction(const ProbeRay& ray, int resolution, const Jitte
 void choose(const ProbeTraceInputs& in, const Probe& probe, std::span<ProbeRay> rays, Batch& batch) {
     if (!in.cull) return;
     const core::Sh lobe = accumulate_brdf(in.visible, probe, in.settings.spacing, in.settings.plane_sharpness,
-                                          in.specular_roughness_max);
+                                          in.specular_readers);
     const std::vector<core::Sh>& mean = in.table.mean_sh();
     batch.brdf.resize(mean.size());
     for (std::size_t texel = 0; texel < mean.size(); ++texel) {

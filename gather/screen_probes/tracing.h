@@ -21,7 +21,7 @@ struct ProbeTraceInputs {
     const ScreenProbeSettings& settings;
     const ProbeAtlas* last = nullptr;  ///< The last frame's probes guide the rays; nullptr: no guess.
     bool cull = true;  ///< Importance sampling; never without the filter, which fills culled texels.
-    float specular_roughness_max = 0.0f;
+    SpecularReaders specular_readers;
     std::uint32_t frame = 0;
 };
 

@@ -140,6 +140,40 @@ TEST(StructuredImportance, RaysGoToTheBrightestTexel) {
     EXPECT_EQ(std::count_if(rays.begin(), rays.end(), [](const auto& ray) { return ray.texel(8) == 40; }), 4);
 }
 
+/// One pixel that looks at a surface from the side. @return what its probe's rays are asked to serve towards
+/// the mirror direction
+float worth_of_mirror(const core::Brdf& brdf, float roughness, const gather::SpecularReaders& readers) {
+    gather::VisibleSurfaces visible;
+    visible.resize(1, 1);
+    visible.points[0].brdf = brdf;
+    visible.points[0].roughness = roughness;
+    visible.outgoing[0] = glm::normalize(glm::vec3(2.0f, 0.0f, 1.0f));
+    visible.depth[0] = 1.0f;
+    const gather::Probe probe{{0, 0}, glm::vec3(0.0f), glm::vec3(0.0f, 0.0f, 1.0f), 1.0f, 0};
+    const core::Sh lobe = gather::accumulate_brdf(visible, probe, 1, 1000.0f, readers);
+    return core::sh_dot(lobe, core::sh_basis(glm::normalize(glm::vec3(-2.0f, 0.0f, 1.0f))));
+}
+
+TEST(StructuredImportance, OnlySurfacesThatReadTheMirrorDirectionAskForRaysThere) {
+    core::Brdf metal;
+    metal.diffuse = glm::vec3(0.0f);
+    metal.f0 = glm::vec3(0.9f);
+    core::Brdf coated = metal;
+    coated.diffuse = glm::vec3(0.6f);
+    coated.f0 = glm::vec3(0.04f);
+    core::Brdf lambert = coated;
+    lambert.f0 = lambert.f90 = glm::vec3(0.0f);
+    const gather::SpecularReaders readers{.above = 0.5f, .most = 0.8f};
+    const float none = worth_of_mirror(metal, 0.7f, {});
+    EXPECT_GT(worth_of_mirror(metal, 0.7f, readers), none + 0.9f);
+    const float little = worth_of_mirror(coated, 0.7f, readers) - none;
+    EXPECT_GT(little, 0.05f);
+    EXPECT_LT(little, 0.5f);
+    EXPECT_EQ(worth_of_mirror(metal, 0.5f, readers), none);  // It takes rays of its own.
+    EXPECT_EQ(worth_of_mirror(metal, 0.9f, readers), none);  // It reads harmonics.
+    EXPECT_EQ(worth_of_mirror(lambert, 0.7f, readers), none);
+}
+
 TEST(ProbeInterpolation, WeightsSumToOneAndLeaveOutOtherPlanes) {
     gather::ProbeAtlas atlas = constant_atlas(8);
     atlas.probes[5].position.z = 0.5f;  // A foreground beside the reader.
