@@ -12,8 +12,6 @@ namespace gather {
 
 namespace {
 
-/// Points along a texel's edge for averages that have no closed form.
-constexpr int kSub = 4;
 constexpr int kEdgeForSh = 256;  ///< Of a whole map: midpoints' error falls with its square.
 
 }  // namespace
@@ -66,22 +64,19 @@ TexelTable::TexelTable(int resolution) {
                 mean[k] = static_cast<float>(sum[k] / (sub_for_sh * sub_for_sh));
             }
             mean_sh_.push_back(mean);
-            for (int j = 0; j < kSub; ++j) {
-                for (int i = 0; i < kSub; ++i) sub_directions_.push_back(sub_direction(x, y, i, j, kSub));
+            for (int j = 0; j < kCells; ++j) {
+                for (int i = 0; i < kCells; ++i) cells_.push_back(sub_direction(x, y, i, j, kCells));
             }
         }
     }
 }
 
 void TexelTable::cosine_weights(const glm::vec3& normal, std::span<float> weights) const {
-    constexpr std::size_t kSubCount = static_cast<std::size_t>(kSub) * kSub;
-    const float scale =
-        4.0f * core::kPi / (static_cast<float>(weights.size()) * static_cast<float>(kSubCount));
+    constexpr float kShare = 1.0f / (kCells * kCells);
+    const float scale = 4.0f * core::kPi * kShare / static_cast<float>(weights.size());
     for (std::size_t texel = 0; texel < weights.size(); ++texel) {
         float sum = 0.0f;
-        for (std::size_t i = 0; i < kSubCount; ++i) {
-            sum += std::max(0.0f, glm::dot(sub_directions_[texel * kSubCount + i], normal));
-        }
+        for (const glm::vec3& direction : cells(texel)) sum += std::max(0.0f, glm::dot(direction, normal));
         weights[texel] = sum * scale;
     }
 }

@@ -92,10 +92,19 @@ public:
     /// angle: the texels' weights in the irradiance. @param weights N x N
     void cosine_weights(const glm::vec3& normal, std::span<float> weights) const;
 
+    /// Cells along a texel's edge.
+    static constexpr int kCells = 4;
+
+    /// Directions of the centres of a texel's cells, row by row.
+    std::span<const glm::vec3> cells(std::size_t texel) const {
+        constexpr std::size_t kCount = static_cast<std::size_t>(kCells) * kCells;
+        return std::span(cells_).subspan(texel * kCount, kCount);
+    }
+
 private:
     std::vector<core::Sh> mean_sh_;
     std::vector<glm::vec3> centers_;
-    std::vector<glm::vec3> sub_directions_;  ///< kSub x kSub a texel.
+    std::vector<glm::vec3> cells_;
 };
 
 /// Projects each probe's radiance: c_lm = (4 pi / N^2) sum_j L_j mean(Y_lm)_j.

@@ -34,55 +34,93 @@ struct Batch {
     std::vector<std::uint32_t> keys;
     std::vector<glm::vec3> radiance;
     std::vector<float> brdf, light;
-    std::vector<float> weights;      ///< A ray's in its texel; see ray_direction().
+    std::vector<float> weights;      ///< A ray's in its texel; see WeightedDirection,
+    std::vector<float> shares;       ///< also for what its light counts.
     std::vector<float> weight_sums;  ///< A texel's.
 };
 
-/// Places within a texel of which a ray takes one, and the number that takes it. The same for all probes of a
-/// frame, so that the rays of neighbours match.
-struct Jitter {
-    std::array<glm::vec2, 8> places;
-    float choice = 0.5f;
-};
-
-Jitter frame_jitter(const ProbeTraceInputs& in) {
-    Jitter jitter;
-    const auto count = static_cast<std::uint32_t>(jitter.places.size());
-    // Without jitter: the same places in every frame.
-    const std::uint32_t frame = in.settings.jitter_directions ? in.frame : 0;
-    const std::uint32_t key = pixel_key(in.inputs.seed, 0, 0, kJitterUse);
-    for (std::uint32_t k = 0; k < count; ++k) {
-        jitter.places[k] = core::SampleSequence(key, frame * count + k).point(0);
+/// Where within its texel each ray of a frame goes, in [0, 1)^2: stratified over the frames, independent from
+/// texel to texel. The same for all probes, so that the rays of neighbours match.
+class Jitter {
+public:
+    explicit Jitter(const ProbeTraceInputs& in) : resolution_(in.settings.resolution) {
+        for (int level = 0; level < 2; ++level) {
+            const auto edge = static_cast<std::uint32_t>(resolution_ << level);
+            for (std::uint32_t texel = 0; texel < edge * edge; ++texel) {
+                const std::uint32_t key =
+                    pixel_key(in.inputs.seed, static_cast<int>(texel), level, kJitterUse);
+                places_[static_cast<std::size_t>(level)].push_back(
+                    in.settings.jitter_directions ? core::SampleSequence(key, in.frame).point(0)
+                                                  : glm::vec2(0.5f));
+            }
+        }
     }
-    jitter.choice = core::SampleSequence(key, frame).point(1).x;
-    return jitter;
-}
+
+    glm::vec2 of(const ProbeRay& ray) const {
+        const int edge = resolution_ << ray.level;
+        return places_[ray.level][static_cast<std::size_t>(ray.y * edge + ray.x)];
+    }
+
+private:
+    int resolution_;
+    std::array<std::vector<glm::vec2>, 2> places_;  ///< By level of the rays.
+};
 
 struct WeightedDirection {
     glm::vec3 direction{0.0f, 0.0f, 1.0f};
-    float weight = 0.0f;  ///< Estimate of the mean cosine over the ray's texel, up to a factor.
+    float weight = 0.0f;  ///< The mean cosine over the ray's texel, up to a factor.
+    float light = 1.0f;   ///< What the ray finds counts by this much.
 };
 
-/// A direction within the texel of a ray, by the cosine about the shading normal (resampled: Talbot, Cline
-/// and Egbert, "Importance Resampling for Global Illumination", 2005). So a texel holds the mean light under
-/// the cosine, and its product with the mean cosine is the irradiance that came through it: no grazing light
-/// is taken for light from higher up, and what lies under the horizon, which is the surface, does not count.
-WeightedDirection ray_direction(const ProbeRay& ray, int resolution, const Jitter& jitter,
-                                const glm::vec3& normal) {
-    const auto edge = static_cast<float>(resolution << ray.level);
-    std::array<glm::vec3, 8> directions;
-    std::array<float, 8> sums;  // Running.
+/// Cuts [0, 1) into parts as long as `weights` and finds the one that holds u, which becomes the place
+/// within.
+/// @pre their sum is `sum` > 0
+std::size_t find_part(std::span<const float> weights, float sum, float& u) {
+    float left = u * sum;
+    std::size_t last = 0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+        if (!(weights[i] > 0.0f)) continue;
+        last = i;
+        if (left < weights[i]) break;
+        left -= weights[i];
+    }
+    u = std::clamp(left / weights[last], 0.0f, 0x1.fffffep-1f);
+    return last;
+}
+
+/// A direction within the texel of a ray, by the cosine about the shading normal: `jitter` is warped by the
+/// cosine of the texel's cells, which keeps it stratified over the frames, and what the cosine still varies
+/// within a cell weighs the light. So a texel holds the mean light under the cosine, and its product with the
+/// mean cosine is the irradiance that came through it: no grazing light is taken for light from higher up,
+/// and what lies under the horizon, which is the surface, does not count.
+WeightedDirection ray_direction(const ProbeRay& ray, const TexelTable& table, int resolution,
+                                glm::vec2 jitter, const glm::vec3& normal) {
+    const int edge = TexelTable::kCells >> ray.level;  // Cells of the ray's texel or quarter of one.
+    const glm::ivec2 first = glm::ivec2(ray.x, ray.y) * edge;
+    const std::span<const glm::vec3> cells = table.cells(ray.texel(resolution));
+    std::array<std::array<float, TexelTable::kCells>, TexelTable::kCells> cosines{};
+    std::array<float, TexelTable::kCells> rows{};
     float sum = 0.0f;
-    for (std::size_t k = 0; k < directions.size(); ++k) {
-        directions[k] = glm::normalize(
-            core::direction_from_octahedral((glm::vec2(ray.x, ray.y) + jitter.places[k]) / edge));
-        sum += std::max(0.0f, glm::dot(directions[k], normal));
-        sums[k] = sum;
+    for (int j = 0; j < edge; ++j) {
+        for (int i = 0; i < edge; ++i) {
+            const int cell =
+                (first.y + j) % TexelTable::kCells * TexelTable::kCells + (first.x + i) % TexelTable::kCells;
+            const float cosine = std::max(0.0f, glm::dot(cells[static_cast<std::size_t>(cell)], normal));
+            cosines[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)] = cosine;
+            rows[static_cast<std::size_t>(j)] += cosine;
+        }
+        sum += rows[static_cast<std::size_t>(j)];
     }
-    for (std::size_t k = 0; k < directions.size(); ++k) {
-        if (sums[k] > jitter.choice * sum) return {directions[k], sum};
-    }
-    return {directions.front(), 0.0f};
+    const auto direction_at = [&](const glm::vec2& place) {
+        const auto cells_of_map = static_cast<float>(resolution * TexelTable::kCells);
+        return glm::normalize(core::direction_from_octahedral((glm::vec2(first) + place) / cells_of_map));
+    };
+    if (!(sum > 0.0f)) return {direction_at(jitter * static_cast<float>(edge)), 0.0f, 1.0f};
+    const std::size_t row = find_part(rows, sum, jitter.y);
+    const std::size_t column = find_part(cosines[row], rows[row], jitter.x);
+    const glm::vec3 direction = direction_at(glm::vec2(column, row) + jitter);
+    return {direction, sum / static_cast<float>(edge * edge),
+            std::max(0.0f, glm::dot(direction, normal)) / cosines[row][column]};
 }
 
 void choose(const ProbeTraceInputs& in, const Probe& probe, std::span<ProbeRay> rays, Batch& batch) {
@@ -106,7 +144,7 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
     const std::size_t texels = atlas.texel_count();
     const std::size_t probes_at_once = std::max<std::size_t>(1, kRaysAtOnce / texels);
     const std::vector<ProbeRay> uniform = uniform_rays(atlas.resolution);
-    const Jitter jitter = frame_jitter(in);
+    const Jitter jitter(in);
     const std::size_t batches = (atlas.probes.size() + probes_at_once - 1) / probes_at_once;
     std::vector<double> brought(batches, 0.0);
     std::vector<double> removed(batches, 0.0);
@@ -139,6 +177,7 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
             batch.keys.resize(count);
             batch.radiance.resize(count);
             batch.weights.resize(count);
+            batch.shares.resize(count);
             batch.weight_sums.assign(count, 0.0f);
             for (std::size_t i = 0; i < count; ++i) {
                 const ProbeRay& choice = batch.choice[batch.order[i]];
@@ -147,9 +186,11 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
                 core::Ray ray;
                 const std::size_t pixel = in.visible.index(probe.pixel.x, probe.pixel.y);
                 const WeightedDirection chosen =
-                    ray_direction(choice, atlas.resolution, jitter, in.visible.points[pixel].frame.normal);
+                    ray_direction(choice, in.table, atlas.resolution, jitter.of(choice),
+                                  in.visible.points[pixel].frame.normal);
                 ray.direction = chosen.direction;
                 batch.weights[i] = chosen.weight;
+                batch.shares[i] = chosen.light;
                 ray.origin = in.visible.origins[pixel];
                 batch.keys[i] = core::hash_words(
                     pixel_key(in.inputs.seed, probe.pixel.x, probe.pixel.y, kProbeUse), choice.x, choice.y,
@@ -172,7 +213,7 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
                 // Over the shading normal's horizon and under the surface: nothing arrives from there.
                 const bool is_under =
                     batch.weights[i] > 0.0f && !(glm::dot(batch.rays.get(i).direction, probe.normal) > 0.0f);
-                glm::vec3 light = is_under ? glm::vec3(0.0f) : batch.radiance[i];
+                glm::vec3 light = is_under ? glm::vec3(0.0f) : batch.shares[i] * batch.radiance[i];
                 const float bright = core::luminance(light);
                 brought[b] += static_cast<double>(bright);
                 if (in.settings.max_ray_intensity > 0.0f && bright > in.settings.max_ray_intensity) {
