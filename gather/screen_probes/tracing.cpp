@@ -91,6 +91,10 @@ private:
     std::array<glm::vec2, static_cast<std::size_t>(kEdge) * kEdge> shifts_{};
 };
 
+/// Along the horizon a cell's centre may lie hardly above it, and a ray of the cell far above: it counts for
+/// no more.
+constexpr float kMostShare = 2.0f;
+
 struct WeightedDirection {
     glm::vec3 direction{0.0f, 0.0f, 1.0f};
     float weight = 0.0f;  ///< The mean cosine over the ray's texel, up to a factor.
@@ -145,7 +149,7 @@ WeightedDirection ray_direction(const ProbeRay& ray, const TexelTable& table, in
     const std::size_t column = find_part(cosines[row], rows[row], jitter.x);
     const glm::vec3 direction = direction_at(glm::vec2(column, row) + jitter);
     return {direction, sum / static_cast<float>(edge * edge),
-            std::max(0.0f, glm::dot(direction, normal)) / cosines[row][column]};
+            std::clamp(glm::dot(direction, normal) / cosines[row][column], 0.0f, kMostShare)};
 }
 
 void choose(const ProbeTraceInputs& in, const Probe& probe, std::span<ProbeRay> rays, Batch& batch) {
