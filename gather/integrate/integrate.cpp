@@ -84,6 +84,15 @@ glm::vec3 rough_reflection(const IntegrateInputs& in, const ProbeWeights& weight
     return sum;
 }
 
+/// Whether the pixel `there` lies in the plane of a point.
+bool is_same_plane(const IntegrateInputs& in, const core::SurfacePoint& point, float depth,
+                   std::size_t there) {
+    const core::SurfacePoint& other = in.visible.points[there];
+    if (other.triangle == point.triangle && other.instance == point.instance) return true;
+    return surface_weight(point.position, point.geometric_normal, depth, other.position,
+                          other.geometric_normal, in.probes.plane_sharpness) > kSamePlane;
+}
+
 }  // namespace
 
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights) {
@@ -101,14 +110,12 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
             if (in.probes.jitter_interpolation && in.atlas.spacing > 1) {
                 const core::SampleSequence sequence(pixel_key(in.seed, at.x, at.y, kInterpolationUse),
                                                     in.frame);
-                const glm::vec2 offset = (sequence.point(0) - 0.5f) * static_cast<float>(in.atlas.spacing);
+                const glm::vec2 offset =
+                    (sequence.independent_point(0) - 0.5f) * static_cast<float>(in.atlas.spacing);
                 const glm::ivec2 moved = glm::clamp(at + glm::ivec2(glm::round(offset)), glm::ivec2(0),
                                                     glm::ivec2(visible.width, visible.height) - 1);
                 const std::size_t there = visible.index(moved.x, moved.y);
-                if (visible.surface(there) &&
-                    surface_weight(point.position, point.geometric_normal, visible.depth[pixel],
-                                   visible.points[there].position, visible.points[there].geometric_normal,
-                                   in.probes.plane_sharpness) > kSamePlane) {
+                if (visible.surface(there) && is_same_plane(in, point, visible.depth[pixel], there)) {
                     reader.pixel = glm::vec2(moved);
                 }
             }

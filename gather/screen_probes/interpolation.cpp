@@ -33,7 +33,9 @@ float normal_weight(const glm::vec3& offset, const glm::vec3& normal, const glm:
 }
 
 float weight_at(float relative_distance, float sharpness) {
-    return std::exp2(-sharpness * relative_distance * relative_distance);
+    const float halvings = sharpness * relative_distance * relative_distance;
+    if (halvings < 1e-4f) return 1.0f;  // In the plane, as most are.
+    return std::exp2(-halvings);
 }
 
 float tent(const glm::vec2& offset, float radius) {
