@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "gather/integrate/bent_normal.h"
-#include "gather/integrate/reflection_reuse.h"
+#include "gather/integrate/reflections.h"
 #include "gather/screen_probes/placement.h"
 #include "gather/screen_probes/probe_atlas.h"
 

@@ -8,7 +8,6 @@
 #include "core/image/image.h"
 #include "core/math/random.h"
 #include "core/support/parallel.h"
-#include "gather/integrate/reflections.h"
 
 namespace gather {
 

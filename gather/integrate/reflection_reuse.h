@@ -12,26 +12,11 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "gather/integrate/reflections.h"
 #include "gather/lighting/visible_surfaces.h"
 #include "gather/settings.h"
 
 namespace gather {
-
-/// A ray that a pixel's specular lobe chose, and what it brought.
-struct ReflectionRay {
-    glm::vec3 direction{0.0f};  ///< Unit.
-    float pdf = 0.0f;           ///< Of the direction, per steradian; 0: the lobe chose one under the surface.
-    glm::vec3 radiance{0.0f};
-    float distance = 0.0f;   ///< Infinite where it escaped.
-    glm::vec3 normal{0.0f};  ///< Of what it met.
-};
-
-/// The rays of a frame: those of pixel i stand from i * rays_a_pixel on. Only pixels that
-/// takes_reflection_rays() have any.
-struct ReflectionRays {
-    std::vector<ReflectionRay> rays;
-    std::size_t rays_a_pixel = 0;
-};
 
 /// Adds to `specular` the light of each pixel's own rays and of its neighbours'.
 void reuse_reflections(const VisibleSurfaces& visible, const ReflectionRays& rays,

@@ -5,12 +5,12 @@
 // other (lighting/scene_lighting.h), are not theirs.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <vector>
 
 #include "core/render/renderer.h"
-#include "gather/integrate/reflection_reuse.h"
 #include "gather/lighting/scene_lighting.h"
 #include "gather/lighting/visible_surfaces.h"
 #include "gather/settings.h"
@@ -19,6 +19,22 @@ namespace gather {
 
 /// Whether a surface is smooth enough for rays of its own.
 bool takes_reflection_rays(const core::SurfacePoint& surface, const IntegrateSettings& settings);
+
+/// A ray that a pixel's specular lobe chose, and what it brought.
+struct ReflectionRay {
+    glm::vec3 direction{0.0f};  ///< Unit.
+    float pdf = 0.0f;           ///< Of the direction, per steradian; 0: the lobe chose one under the surface.
+    glm::vec3 radiance{0.0f};
+    float distance = 0.0f;   ///< Infinite where it escaped.
+    glm::vec3 normal{0.0f};  ///< Of what it met.
+};
+
+/// The rays of a frame: those of pixel i stand from i * rays_a_pixel on. Only pixels that
+/// takes_reflection_rays() have any.
+struct ReflectionRays {
+    std::vector<ReflectionRay> rays;
+    std::size_t rays_a_pixel = 0;
+};
 
 struct ReflectionCost {
     std::uint64_t rays = 0;
