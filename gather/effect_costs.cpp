@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <string_view>
 
-#include "gather/integrate/bent_normal.h"
 #include "gather/integrate/reflections.h"
 #include "gather/screen_probes/placement.h"
 #include "gather/screen_probes/probe_atlas.h"
@@ -67,9 +66,9 @@ std::uint64_t bytes_of(Effect effect, const Plan& plan, int width, int height, c
         case Effect::kSpatialFilter:  // A pass reads one copy of the light and writes the other.
             return (uniform + adaptive) * edge * edge * (sizeof(glm::vec3) + 2);
         case Effect::kBentNormal: {
-            // The near field besides: a pixel's light and how open it was, and a copy of the probes' texels.
+            // The near field besides: a pixel's light and its history, and a copy of the probes' texels.
             const bool traced = settings.integrate.near_field == NearField::kTraced;
-            const std::uint64_t pixel = sizeof(BentNormal) + (traced ? sizeof(NearLight) + sizeof(float) : 0);
+            const std::uint64_t pixel = sizeof(BentNormal) + (traced ? kNearLightBytes : 0);
             return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) * pixel +
                    (traced ? (uniform + adaptive) * edge * edge * kNearCopyBytes : 0);
         }

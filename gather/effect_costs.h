@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "core/render/renderer.h"
+#include "gather/integrate/bent_normal.h"
 #include "gather/plan.h"
 #include "gather/settings.h"
+#include "gather/temporal/accumulation.h"
 
 namespace gather {
 
@@ -24,6 +26,10 @@ struct EffectCost {
 /// @param passes that ran, of a frame that this plan made
 std::array<EffectCost, kEffectCount> effect_costs(const Plan& plan, const std::vector<core::PassCost>& passes,
                                                   int width, int height, const Settings& settings);
+
+/// Bytes a pixel that comparing near light with the probes takes.
+constexpr std::uint64_t kNearLightBytes = sizeof(NearLight) + sizeof(float) + sizeof(ProbeAgreement) +
+                                          2 * sizeof(glm::vec3) + Accumulation::kControlBytes + sizeof(float);
 
 /// Most bytes of the probes' cache under this plan.
 std::uint64_t probe_cache_bytes(const Plan& plan, int width, int height, const Settings& settings);

@@ -80,7 +80,7 @@ public:
           table_(settings.screen_probes.resolution),
           outlines_(inputs.width, inputs.height,
                     plan.on(Effect::kTemporal) ? settings.film.outline_samples : 1),
-          accumulation_(inputs.width, inputs.height, inputs.aovs),
+          accumulation_(inputs.width, inputs.height, inputs.aovs, compares_near_light()),
           ledger_(inputs.stop_requested) {}
 
     /// The frame as an ordered list of passes.
@@ -117,10 +117,13 @@ public:
     core::Frame finish(int frame_count);
 
 private:
+    /// Whether short rays are compared with the probes: their light has control variates.
+    bool compares_near_light() const {
+        return plan_.on(Effect::kBentNormal) && settings_.integrate.near_field == NearField::kTraced;
+    }
     void gather_light(std::uint32_t frame);
     SpecularReaders specular_readers() const;
     void trace_smooth(std::uint32_t frame);
-    void remember_openness(std::uint32_t frame);
     FramePixel frame_pixel(std::size_t pixel) const;
     FramePixel outline_pixel(const OutlineSample& sample) const;
     void accumulate();
@@ -138,14 +141,15 @@ private:
     Ledger ledger_;
 
     VisibleSurfaces visible_;
-    std::vector<glm::vec3> direct_, diffuse_, specular_;
+    std::vector<glm::vec3> direct_;
+    IndirectLight indirect_;
     ReflectionRays reflection_rays_;
     ProbeAtlas atlas_, last_atlas_;
     bool has_last_ = false;
     std::vector<ProbeWeights> weights_;
     std::vector<BentNormal> bent_;
     std::vector<NearLight> near_light_;
-    std::vector<float> openness_;  ///< Mean visibility over the frames so far.
+    NearHistory history_;
 };
 
 void Picture::gather_light(std::uint32_t frame) {
@@ -178,8 +182,8 @@ void Picture::gather_light(std::uint32_t frame) {
     });
     ledger_.time("probe_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
     const bool bent = plan_.on(Effect::kBentNormal);
-    const bool traced = settings_.integrate.near_field == NearField::kTraced;
-    if (bent && traced) {
+    const bool traced = compares_near_light();
+    if (traced) {
         ledger_.time("near_field", [&] {
             take_out_near_field(probes, visible_, settings_.integrate.bent_normal_pixels, atlas_);
             return PassRays{};
@@ -198,15 +202,14 @@ void Picture::gather_light(std::uint32_t frame) {
     });
     if (probes.probe_visibility && probes.spacing > 1) {
         ledger_.time("probe_visibility",
-                     [&] { return hide_probes(inputs_, visible_, atlas_, openness_, weights_); });
+                     [&] { return hide_probes(inputs_, visible_, atlas_, history_.openness, weights_); });
     }
     if (bent) {
         BentNormalRays rays;
         ledger_.time("bent_normal", [&] {
-            const NearLighting near{hit_lighting_, atlas_, weights_, openness_};
+            const NearLighting near{hit_lighting_, atlas_, weights_, history_};
             rays = trace_bent_normals(inputs_, visible_, settings_.integrate, frame, traced ? &near : nullptr,
                                       bent_, near_light_);
-            if (traced) remember_openness(frame);
             return PassRays{rays.short_rays, rays.exhausted};
         });
         if (traced) ledger_.time("bent_normal_shadows", [&] { return PassRays{rays.shadow_rays, 0}; });
@@ -215,11 +218,10 @@ void Picture::gather_light(std::uint32_t frame) {
         const bool cone = bent && !traced;
         if (cone || settings_.integrate.diffuse == DiffuseIntegral::kSh) project_to_sh(table_, atlas_);
         static const std::vector<BentNormal> kOpen;
-        diffuse_.assign(visible_.depth.size(), glm::vec3(0.0f));
-        specular_.assign(visible_.depth.size(), glm::vec3(0.0f));
-        integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_light_, diffuse_);
+        indirect_.reset(visible_.depth.size(), compares_near_light());
+        integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_light_, indirect_);
         integrate_specular(in, weights_, {directional, plan_.on(Effect::kReflections)}, near_light_,
-                           specular_);
+                           indirect_);
         return PassRays{};
     });
     if (plan_.on(Effect::kReflections)) trace_smooth(frame);
@@ -240,17 +242,10 @@ void Picture::trace_smooth(std::uint32_t frame) {
     });
     ledger_.time("reflection_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
     ledger_.time("reflection_reuse", [&] {
-        reuse_reflections(visible_, reflection_rays_, settings_.integrate, inputs_.seed, frame, specular_);
+        reuse_reflections(visible_, reflection_rays_, settings_.integrate, inputs_.seed, frame,
+                          indirect_.specular);
         return PassRays{};
     });
-}
-
-void Picture::remember_openness(std::uint32_t frame) {
-    openness_.resize(bent_.size(), 0.0f);
-    const float share = 1.0f / static_cast<float>(frame + 1);
-    for (std::size_t pixel = 0; pixel < bent_.size(); ++pixel) {
-        openness_[pixel] += share * (bent_[pixel].visibility - openness_[pixel]);
-    }
 }
 
 FramePixel Picture::frame_pixel(std::size_t pixel) const {
@@ -266,8 +261,12 @@ FramePixel Picture::frame_pixel(std::size_t pixel) const {
     value.albedo = core::approximate_albedo(point.brdf);
     value.bent_normal = bent_.empty() ? point.frame.normal : bent_[pixel].direction;
     if (plan_.on(Effect::kScreenProbes)) {
-        value.indirect_diffuse = diffuse_[pixel];
-        value.indirect_specular = specular_[pixel];
+        value.indirect_diffuse = indirect_.diffuse[pixel];
+        value.indirect_specular = indirect_.specular[pixel];
+        if (compares_near_light()) {
+            value.diffuse_control = indirect_.diffuse_control[pixel];
+            value.specular_control = indirect_.specular_control[pixel];
+        }
         value.probe_support = weights_[pixel].support;
     }
     return value;
@@ -279,6 +278,8 @@ FramePixel Picture::outline_pixel(const OutlineSample& sample) const {
         value = frame_pixel(sample.source);
         value.indirect_diffuse *= sample.tint;
         value.indirect_specular *= sample.tint;
+        value.diffuse_control *= sample.tint;
+        value.specular_control *= sample.tint;
         value.albedo *= sample.tint;
     }
     value.direct = sample.direct;
@@ -344,7 +345,9 @@ core::Image crop_image(const core::Image& image, const core::Crop& crop) {
 
 core::Frame Picture::finish(int frame_count) {
     core::Frame frame;
-    frame.image = accumulation_.develop();
+    std::vector<float> control_shares;
+    for (const ProbeAgreement& pixel : history_.agreement) control_shares.push_back(pixel.probe_share());
+    frame.image = accumulation_.develop(control_shares);
     add_probe_layers(frame.image);
     if (inputs_.crop.width > 0) frame.image = crop_image(frame.image, inputs_.crop);
     frame.passes = ledger_.passes();
@@ -377,8 +380,8 @@ std::uint64_t FinalGather::picture_bytes(int width, int height, const Settings& 
     for (PlannedEffect& effect : everything.effects) effect.on = true;
     return probe_cache_bytes(everything, width, height, settings) + Accumulation::bytes(width, height, aovs) +
            Outlines::bytes(width, height, settings.film.outline_samples) +
-           pixels * (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + sizeof(NearLight) + sizeof(float) +
-                     sizeof(ProbeWeights) + sizeof(BentNormal));
+           pixels * (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + kNearLightBytes + sizeof(ProbeWeights) +
+                     sizeof(BentNormal));
 }
 
 core::Frame FinalGather::render(const core::RenderInputs& inputs) {

@@ -20,6 +20,9 @@ enum Dimension : std::uint32_t { kDirection, kAlpha };
 constexpr std::uint32_t kFramesToTrust = 2;
 constexpr float kOpen = 0.999f;
 
+/// Luminances beyond it agree as it does: its square is finite.
+constexpr float kMostCompared = 1e15f;
+
 /// Short rays of some rows of pixels, side by side.
 struct ShortRays {
     core::RayStream rays;
@@ -56,6 +59,9 @@ public:
                HitLightingCounters& counters) const;
 
 private:
+    void compare(const NearLighting& near, const ShortRays& in, std::size_t first, std::size_t last,
+                 std::span<const glm::vec3> own, NearLight& light) const;
+
     const core::RenderInputs& inputs_;
     const VisibleSurfaces& visible_;
     const IntegrateSettings& settings_;
@@ -65,8 +71,8 @@ private:
 
 /// A pixel whose rays of some frames found all open takes one from then on, until it finds something.
 std::uint32_t BentNormalPass::rays_of(std::size_t pixel, const NearLighting* near) const {
-    const bool open =
-        near && frame_ >= kFramesToTrust && near->openness[pixel] >= kOpen && near->weights[pixel].confident;
+    const bool open = near && frame_ >= kFramesToTrust && near->history.openness[pixel] >= kOpen &&
+                      near->weights[pixel].confident;
     return open ? 1 : rays_a_pixel_;
 }
 
@@ -157,32 +163,61 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
     if (count > 0) {
         counters = near.hit_lighting.shade(found.rays, found.hits, found.keys, frame_, found.radiance);
     }
-    std::size_t shaded = 0;
-    for (std::size_t i = 0; i < in.pixels.size(); ++i) {
-        const std::size_t pixel = in.pixels[i];
-        NearLight& light = result[pixel];
-        const bool has_own = in.occluded[i] || in.alone[i];
-        glm::vec3 own(0.0f);
-        if (has_own) own = found.radiance[shaded++];
+    std::span<const glm::vec3> own = found.radiance;
+    for (std::size_t i = 0, last; i < in.pixels.size(); i = last) {
+        std::size_t own_count = 0;
+        for (last = i; last < in.pixels.size() && in.pixels[last] == in.pixels[i]; ++last) {
+            own_count += in.occluded[last] || in.alone[last] ? 1 : 0;
+        }
+        compare(near, in, i, last, own.first(own_count), result[in.pixels[i]]);
+        own = own.subspan(own_count);
+    }
+}
+
+/// Of one pixel, whose rays are `first` up to `last`. @param own light of those that found their own
+void BentNormalPass::compare(const NearLighting& near, const ShortRays& in, std::size_t first,
+                             std::size_t last, std::span<const glm::vec3> own, NearLight& light) const {
+    const std::size_t pixel = in.pixels[first];
+    ProbeAgreement& agreement = near.history.agreement[pixel];
+    // In the open the rays hold what the probes do.
+    if (own.empty() && !(agreement.held > 0.0f)) return;
+    if (!in.alone[first]) light.kind = NearLight::Kind::kCompared;
+    const core::SurfacePoint& point = visible_.points[pixel];
+    const glm::vec3 outgoing = point.frame.to_local(visible_.outgoing[pixel]);
+    const bool reflects = reflects_near_light(point);
+    const ProbeWeights& weights = near.weights[pixel];
+    const float share = core::kPi / static_cast<float>(rays_of(pixel, &near));
+    ProbeAgreement sum;
+    for (std::size_t i = first; i < last; ++i) {
+        const glm::vec3 direction = in.rays.get(i).direction;
         glm::vec3 held(0.0f);
-        if (!in.alone[i] && (has_own ? light.probe_share > 0.0f : light.probe_share < 1.0f)) {
-            const ProbeWeights& weights = near.weights[pixel];
-            const glm::vec2 at = core::octahedral_from_direction(in.rays.get(i).direction);
+        if (!in.alone[i]) {
+            const glm::vec2 at = core::octahedral_from_direction(direction);
             for (std::size_t k = 0; k < weights.count; ++k) {
                 held += weights.weight[k] * near.atlas.read(weights.probe[k], at);
             }
         }
-        const float share = core::kPi / static_cast<float>(rays_of(pixel, &near));
-        const glm::vec3 change = share * ((has_own ? own : held) - light.probe_share * held);
-        light.irradiance += change;
-        const core::SurfacePoint& point = visible_.points[pixel];
-        if (change != glm::vec3(0.0f) && reflects_near_light(point)) {
-            light.specular +=
-                change * core::evaluate(point.brdf, point.frame.to_local(visible_.outgoing[pixel]),
-                                        point.frame.to_local(in.rays.get(i).direction))
-                             .value.specular;
+        glm::vec3 found = held;
+        if (in.occluded[i] || in.alone[i]) {
+            found = own.front();
+            own = own.subspan(1);
+        }
+        const float held_luminance = std::min(core::luminance(held), kMostCompared);
+        sum.found += std::min(core::luminance(found), kMostCompared) * held_luminance;
+        sum.held += held_luminance * held_luminance;
+        light.found.irradiance += share * found;
+        light.held.irradiance += share * held;
+        if (reflects && (found != glm::vec3(0.0f) || held != glm::vec3(0.0f))) {
+            const glm::vec3 lobe =
+                core::evaluate(point.brdf, outgoing, point.frame.to_local(direction)).value.specular;
+            light.found.specular += share * found * lobe;
+            light.held.specular += share * held * lobe;
         }
     }
+    // Frames that found all open, and compared nothing, agreed; their light was about what it is now.
+    const float before = agreement.held > 0.0f ? 0.0f : static_cast<float>(frame_) * sum.held;
+    agreement.found += sum.found + before;
+    agreement.held += sum.held + before;
 }
 
 }  // namespace
@@ -203,13 +238,12 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
     }
     near_light.clear();
     if (near) {
+        near->history.openness.resize(visible.depth.size(), 0.0f);
+        near->history.agreement.resize(visible.depth.size());
         near_light.assign(visible.depth.size(), NearLight{});
         for (std::size_t pixel = 0; pixel < near_light.size(); ++pixel) {
-            if (!visible.surface(pixel)) continue;
-            if (!near->weights[pixel].confident) {
-                near_light[pixel].probe_share = 0.0f;
-            } else if (!near->openness.empty()) {
-                near_light[pixel].probe_share = near->openness[pixel];
+            if (visible.surface(pixel) && !near->weights[pixel].confident) {
+                near_light[pixel].kind = NearLight::Kind::kAlone;
             }
         }
     }
@@ -227,6 +261,13 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
         shadow_rays += counters.shadow_rays;
         exhausted += counters.exhausted;
     });
+    if (near) {
+        const float share = 1.0f / static_cast<float>(frame + 1);
+        std::vector<float>& openness = near->history.openness;
+        for (std::size_t pixel = 0; pixel < openness.size(); ++pixel) {
+            openness[pixel] += share * (result[pixel].visibility - openness[pixel]);
+        }
+    }
     return {short_rays, shadow_rays, exhausted};
 }
 

@@ -5,12 +5,17 @@
 // - traced: where a short ray hits, the hit's own light takes the place of what the probes hold in its
 //   direction. It is a control variate: its mean is right whatever the probes say of near things, and it has
 //   no noise where nothing is near. Where no probe lies on a pixel's surface, its rays are not short, and all
-//   that they find is its light: features too thin or too many for probes do not leak.
+//   that they find is its light: features too thin or too many for probes do not leak. Its coefficient is the
+//   regression of what the rays found on what the probes held, so that where something dark stands before a
+//   probe's brightest direction, a crease beside a lit floor, the probes' noise is not subtracted for
+//   nothing.
 // - multi_bounce: the probes through a cone about the opening, and what nearby surfaces send back estimated
 //   (Jimenez, Wu, Pesce and Jarabo, "Practical Realtime Strategies for Accurate Indirect Occlusion", 2016),
 //   after Mayaux, "Horizon-Based Indirect Lighting", 2018. No shadow rays, and no noise but of the opening.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
@@ -30,23 +35,44 @@ struct BentNormal {
     float visibility = 1.0f;                ///< 1 - the cosine-weighted share that is occluded.
 };
 
+/// Of one pixel, sums over the short rays of the frames so far. Luminances.
+struct ProbeAgreement {
+    float found =
+        0.0f;  ///< Of what a ray's direction holds, its hit's light or the probes', times the probes'.
+    float held = 0.0f;  ///< Of the squares of what the probes held. 0: nothing near was found yet.
+
+    /// The coefficient of the control variate: the regression of what was found on what was held.
+    float probe_share() const { return held > 0.0f ? std::min(1.0f, found / held) : 1.0f; }
+};
+
+/// What the frames so far found near each pixel; empty before the first.
+struct NearHistory {
+    std::vector<float> openness;  ///< Mean visibility.
+    std::vector<ProbeAgreement> agreement;
+};
+
 /// What `traced` compares: the light of hits with that of the probes.
 struct NearLighting {
     const HitLighting& hit_lighting;
     const ProbeAtlas& atlas;
     const std::vector<ProbeWeights>& weights;  ///< A pixel's.
-    /// Mean visibility of each pixel over the frames before; empty in the first. Never of this frame's rays:
-    /// what they decide may not depend on them, or the mean would be wrong.
-    std::span<const float> openness;
+    NearHistory& history;                      ///< Read, and this frame's rays added.
 };
 
-/// A pixel's irradiance is probe_share times the probes', and this. The share is the coefficient of the
-/// control variate: 1 in the open, where the rays then add nothing; in a crease, where the probes' light is
-/// hardly seen, their noise would be that of subtracting it.
+/// What a pixel's short rays say of its light.
 struct NearLight {
-    glm::vec3 irradiance{0.0f};  ///< Of either sign.
-    glm::vec3 specular{0.0f};    ///< Likewise, as radiance: of surfaces that reflects_near_light().
-    float probe_share = 1.0f;
+    enum class Kind : std::uint8_t {
+        kOpen,      ///< Nothing near: its light is the probes'.
+        kCompared,  ///< Its light is `found`, and for any share of it the probes' less `held`: of mean 0.
+        kAlone,     ///< No probe lies on its surface: its light is `found`.
+    };
+    struct Light {
+        glm::vec3 irradiance{0.0f};
+        glm::vec3 specular{0.0f};  ///< As radiance: of surfaces that reflects_near_light().
+    };
+    Light found;  ///< Of the rays' hits, and of the probes where a ray is open.
+    Light held;   ///< Of the probes in all directions of the rays.
+    Kind kind = Kind::kOpen;
 };
 
 /// Whether the specular lobe is wide enough for rays that follow the cosine: smoother ones would speckle.

@@ -84,6 +84,28 @@ glm::vec3 rough_reflection(const IntegrateInputs& in, const ProbeWeights& weight
     return sum;
 }
 
+/// The same by directions drawn to the visible normals of GGX.
+glm::vec3 directional_reflection(const IntegrateInputs& in, const ProbeWeights& weights,
+                                 const core::SurfacePoint& point, std::size_t pixel) {
+    glm::vec3 sum(0.0f);
+    if (weights.count == 0) return sum;
+    const auto width = static_cast<std::size_t>(in.visible.width);
+    const auto samples = static_cast<std::uint32_t>(in.settings.specular_directions);
+    const std::uint32_t key =
+        pixel_key(in.seed, static_cast<int>(pixel % width), static_cast<int>(pixel / width), kSpecularUse);
+    const glm::vec3 outgoing = point.frame.to_local(in.visible.outgoing[pixel]);
+    for (std::uint32_t k = 0; k < samples; ++k) {
+        const core::SampleSequence sequence(key, in.frame * samples + k);
+        const core::BrdfSample chosen = core::sample_specular(point.brdf, outgoing, sequence.point(0));
+        if (!(chosen.pdf > 0.0f)) continue;
+        const glm::vec3 direction = glm::normalize(point.frame.to_world(chosen.incoming));
+        const glm::vec3 light = in.atlas.read(choose_probe(weights, sequence.point(1).x),
+                                              core::octahedral_from_direction(direction));
+        sum += chosen.value.specular * (chosen.incoming.z / chosen.pdf) * light;
+    }
+    return sum / static_cast<float>(samples);
+}
+
 /// Whether the pixel `there` lies in the plane of a point.
 bool is_same_plane(const IntegrateInputs& in, const core::SurfacePoint& point, float depth,
                    std::size_t there) {
@@ -94,6 +116,13 @@ bool is_same_plane(const IntegrateInputs& in, const core::SurfacePoint& point, f
 }
 
 }  // namespace
+
+void IndirectLight::reset(std::size_t pixels, bool controlled) {
+    for (auto* light : {&diffuse, &specular}) light->assign(pixels, glm::vec3(0.0f));
+    for (auto* control : {&diffuse_control, &specular_control}) {
+        control->assign(controlled ? pixels : 0, glm::vec3(0.0f));
+    }
+}
 
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights) {
     const VisibleSurfaces& visible = in.visible;
@@ -126,7 +155,7 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
 
 void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
                        const std::vector<BentNormal>& bent, const std::vector<NearLight>& near_light,
-                       std::vector<glm::vec3>& diffuse) {
+                       IndirectLight& light) {
     const VisibleSurfaces& visible = in.visible;
     core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
         std::vector<float> cosine_weights;
@@ -136,11 +165,13 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
             const glm::vec3& normal = point.frame.normal;
             const glm::vec3 albedo = diffuse_albedo(point.brdf, glm::dot(normal, visible.outgoing[pixel]));
             if (albedo == glm::vec3(0.0f)) continue;
-            const NearLight near = near_light.empty() ? NearLight{} : near_light[pixel];
-            glm::vec3 arriving(0.0f);
-            if (near.probe_share > 0.0f) {
-                arriving = near.probe_share * irradiance(in, weights[pixel], normal, cosine_weights);
+            const glm::vec3 brdf = albedo / core::kPi;
+            const NearLight* near = near_light.empty() ? nullptr : &near_light[pixel];
+            if (near && near->kind == NearLight::Kind::kAlone) {
+                light.diffuse[pixel] += brdf * near->found.irradiance;
+                continue;
             }
+            glm::vec3 arriving = irradiance(in, weights[pixel], normal, cosine_weights);
             if (!bent.empty() && bent[pixel].visibility < 1.0f) {
                 const float v = bent[pixel].visibility;
                 const float occlusion = multi_bounce(
@@ -149,48 +180,39 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
                 const core::ShColor sh = mix_sh(in.atlas, weights[pixel]);
                 arriving = cone_irradiance(sh, bent[pixel]) + (occlusion - v) * arriving;
             }
-            arriving += near.irradiance;
-            diffuse[pixel] += albedo / core::kPi * arriving;
+            if (near && near->kind == NearLight::Kind::kCompared) {
+                light.diffuse_control[pixel] += brdf * (arriving - near->held.irradiance);
+                arriving = near->found.irradiance;
+            }
+            light.diffuse[pixel] += brdf * arriving;
         }
     });
 }
 
 void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
                         const SpecularModes& modes, const std::vector<NearLight>& near_light,
-                        std::vector<glm::vec3>& specular) {
+                        IndirectLight& light) {
     const VisibleSurfaces& visible = in.visible;
-    const auto width = static_cast<std::size_t>(visible.width);
-    const auto samples = static_cast<std::uint32_t>(in.settings.specular_directions);
     core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
             if (!visible.surface(pixel)) continue;
             const core::SurfacePoint& point = visible.points[pixel];
             if (!core::has_specular(point.brdf)) continue;
             if (modes.reflections && takes_reflection_rays(point, in.settings)) continue;
-            const glm::vec3 outgoing = point.frame.to_local(visible.outgoing[pixel]);
-            const NearLight near =
-                near_light.empty() || !reflects_near_light(point) ? NearLight{} : near_light[pixel];
-            specular[pixel] += near.specular;
-            if (!modes.directional || point.roughness > in.settings.rough_specular_max) {
-                specular[pixel] +=
-                    near.probe_share * rough_reflection(in, weights[pixel], point, visible.outgoing[pixel]);
+            const bool has_near = !near_light.empty() && reflects_near_light(point);
+            const NearLight* near = has_near ? &near_light[pixel] : nullptr;
+            if (near && near->kind == NearLight::Kind::kAlone) {
+                light.specular[pixel] += near->found.specular;
                 continue;
             }
-            const std::uint32_t key = pixel_key(in.seed, static_cast<int>(pixel % width),
-                                                static_cast<int>(pixel / width), kSpecularUse);
-            if (weights[pixel].count == 0) continue;
-            glm::vec3 sum(0.0f);
-            for (std::uint32_t k = 0; k < samples; ++k) {
-                const core::SampleSequence sequence(key, in.frame * samples + k);
-                const core::BrdfSample chosen =
-                    core::sample_specular(point.brdf, outgoing, sequence.point(0));
-                if (!(chosen.pdf > 0.0f)) continue;
-                const glm::vec3 direction = glm::normalize(point.frame.to_world(chosen.incoming));
-                const glm::vec3 light = in.atlas.read(choose_probe(weights[pixel], sequence.point(1).x),
-                                                      core::octahedral_from_direction(direction));
-                sum += chosen.value.specular * (chosen.incoming.z / chosen.pdf) * light;
+            glm::vec3 arriving = modes.directional && point.roughness <= in.settings.rough_specular_max
+                                     ? directional_reflection(in, weights[pixel], point, pixel)
+                                     : rough_reflection(in, weights[pixel], point, visible.outgoing[pixel]);
+            if (near && near->kind == NearLight::Kind::kCompared) {
+                light.specular_control[pixel] += arriving - near->held.specular;
+                arriving = near->found.specular;
             }
-            specular[pixel] += near.probe_share * sum / static_cast<float>(samples);
+            light.specular[pixel] += arriving;
         }
     });
 }

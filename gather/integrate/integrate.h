@@ -23,14 +23,23 @@ struct IntegrateInputs {
     std::uint32_t frame = 0;
 };
 
+/// Indirect light toward the eye by pixel, and the control variates of near light: the picture may take any
+/// share of them, for their mean is 0. See NearLight.
+struct IndirectLight {
+    std::vector<glm::vec3> diffuse, specular;
+    std::vector<glm::vec3> diffuse_control, specular_control;  ///< Empty where near light is not compared.
+
+    void reset(std::size_t pixels, bool controlled);
+};
+
 /// Which probes every pixel reads.
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights);
 
-/// Light that the diffuse lobe sends to the eye, added to `diffuse`. @param bent what the probes are
+/// Light that the diffuse lobe sends to the eye, added to `light`. @param bent what the probes are
 /// seen through; empty: everything is open. @param near_light may be empty
 void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
                        const std::vector<BentNormal>& bent, const std::vector<NearLight>& near_light,
-                       std::vector<glm::vec3>& diffuse);
+                       IndirectLight& light);
 
 struct SpecularModes {
     bool directional = false;  ///< Surfaces up to settings.rough_specular_max reflect in GGX directions.
@@ -42,6 +51,6 @@ struct SpecularModes {
 /// @param near_light may be empty
 void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeights>& weights,
                         const SpecularModes& modes, const std::vector<NearLight>& near_light,
-                        std::vector<glm::vec3>& specular);
+                        IndirectLight& light);
 
 }  // namespace gather

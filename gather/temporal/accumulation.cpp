@@ -15,14 +15,19 @@ bool needs_auxiliary(const std::set<std::string>& layers) {
 
 }  // namespace
 
-Accumulation::Accumulation(int width, int height, std::set<std::string> layers)
-    : width_(width), height_(height), layers_(std::move(layers)), auxiliary_(needs_auxiliary(layers_)) {
+Accumulation::Accumulation(int width, int height, std::set<std::string> layers, bool controlled)
+    : width_(width),
+      height_(height),
+      layers_(std::move(layers)),
+      auxiliary_(needs_auxiliary(layers_)),
+      controlled_(controlled) {
     clear();
 }
 
 void Accumulation::clear() {
     const std::size_t count = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
     sums_.assign(count, Sum{});
+    control_sums_.assign(controlled_ ? count : 0, ControlSum{});
     auxiliary_sums_.assign(auxiliary_ ? count : 0, AuxiliarySum{});
 }
 
@@ -33,6 +38,10 @@ void Accumulation::add(std::size_t pixel, const FramePixel& value) {
     sum.indirect_specular += value.indirect_specular;
     sum.count += 1.0f;
     if (value.surface) sum.surface_count += 1.0f;
+    if (controlled_) {
+        control_sums_[pixel].diffuse += value.diffuse_control;
+        control_sums_[pixel].specular += value.specular_control;
+    }
     if (!auxiliary_) return;
     AuxiliarySum& more = auxiliary_sums_[pixel];
     more.steps += value.steps;
@@ -45,21 +54,31 @@ void Accumulation::add(std::size_t pixel, const FramePixel& value) {
     more.probe_support += value.probe_support;
 }
 
-core::Image Accumulation::develop() const {
+core::Image Accumulation::develop(std::span<const float> control_shares) const {
     core::Image image(width_, height_);
     const std::size_t count = sums_.size();
     std::vector<glm::vec3> colors(count);
     const auto add_color = [&](const char* layer, const auto& color) {
-        for (std::size_t i = 0; i < count; ++i) colors[i] = color(sums_[i]) / sums_[i].count;
+        for (std::size_t i = 0; i < count; ++i) colors[i] = color(i) / sums_[i].count;
         image.add_color(layer, colors);
     };
-    // Differences of near light may leave a mean below 0 by their noise; frames are never clamped.
-    const auto diffuse = [](const Sum& s) { return glm::max(s.indirect_diffuse, glm::vec3(0.0f)); };
-    const auto specular = [](const Sum& s) { return glm::max(s.indirect_specular, glm::vec3(0.0f)); };
-    add_color("", [&](const Sum& s) { return s.direct + diffuse(s) + specular(s); });
+    // A control variate that leaves less than nothing is noise, and larger than what was found without it.
+    const auto controlled = [&](std::size_t i, const glm::vec3& sum, glm::vec3 ControlSum::*control) {
+        if (control_sums_.empty()) return sum;
+        const glm::vec3 better = sum + control_shares[i] * control_sums_[i].*control;
+        return glm::all(glm::greaterThanEqual(better, glm::vec3(0.0f))) ? better : sum;
+    };
+    const auto direct = [&](std::size_t i) { return sums_[i].direct; };
+    const auto diffuse = [&](std::size_t i) {
+        return controlled(i, sums_[i].indirect_diffuse, &ControlSum::diffuse);
+    };
+    const auto specular = [&](std::size_t i) {
+        return controlled(i, sums_[i].indirect_specular, &ControlSum::specular);
+    };
+    add_color("", [&](std::size_t i) { return direct(i) + diffuse(i) + specular(i); });
     std::vector<float>& alpha = image.add_channel("A");
     for (std::size_t i = 0; i < count; ++i) alpha[i] = sums_[i].surface_count / sums_[i].count;
-    if (layers_.count("Direct")) add_color("Direct", [](const Sum& s) { return s.direct; });
+    if (layers_.count("Direct")) add_color("Direct", direct);
     if (layers_.count("IndirectDiffuse")) add_color("IndirectDiffuse", diffuse);
     if (layers_.count("IndirectSpecular")) add_color("IndirectSpecular", specular);
     // Means over the samples that saw a surface.

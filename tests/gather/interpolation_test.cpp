@@ -119,14 +119,15 @@ TEST(IntegrateSpecular, ConstantProbesGiveTheDirectionalAlbedo) {
         point.brdf.diffuse = glm::vec3(0.0f);
         point.brdf.f0 = glm::vec3(0.7f);
         point.brdf.alpha = roughness * roughness;
-        std::vector<glm::vec3> specular(1, glm::vec3(0.0f));
+        gather::IndirectLight light;
+        light.reset(1, false);
         constexpr std::uint32_t kFrames = 64;
         for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
             gather::integrate_specular({visible, atlas, table, {}, settings, 1, frame}, {weights},
-                                       {.directional = true}, {}, specular);
+                                       {.directional = true}, {}, light);
         }
         const double albedo = sampled_albedo(point.brdf, point.frame.to_local(visible.outgoing[0]));
-        EXPECT_NEAR(static_cast<double>(specular[0].x) / kFrames / albedo, 1.0, 0.01);
+        EXPECT_NEAR(static_cast<double>(light.specular[0].x) / kFrames / albedo, 1.0, 0.01);
     }
 }
 
