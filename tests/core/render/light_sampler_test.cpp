@@ -37,24 +37,36 @@ TEST(LightSampler, ChoosesDirectionsWithTheDensityItClaims) {
     const core::LightSampler::Selection selection = sampler.selection(receiver);
 
     // The truth about which triangle a direction meets, in double, by Cramer's rule.
-    const auto density = [&](const glm::vec3& direction) {
-        double sum = 0.0;
-        for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
-            const core::Mesh& mesh = scene.meshes[scene.instances[i].mesh];
-            for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-                glm::dvec3 p[3];
-                for (int c = 0; c < 3; ++c) {
-                    p[c] = glm::dvec3(scene.instances[i].world_from_local *
-                                      glm::dvec4(mesh.positions[mesh.triangles[t][c]], 1.0));
-                }
-                const glm::dmat3 system(p[1] - p[0], p[2] - p[0], -glm::dvec3(direction));
-                if (std::abs(glm::determinant(system)) < 1e-12) continue;
-                const glm::dvec3 solution = glm::inverse(system) * (glm::dvec3(receiver.position) - p[0]);
-                if (solution.x < 0 || solution.y < 0 || solution.x + solution.y > 1 || solution.z <= 0)
-                    continue;
-                sum += static_cast<double>(sampler.emitter_pdf(receiver, selection, i, t, direction,
-                                                               static_cast<float>(solution.z)));
+    struct Emitter {
+        std::uint32_t instance, triangle;
+        glm::dvec3 to_receiver, edge1, edge2;  ///< From the first corner.
+    };
+    std::vector<Emitter> emitters;
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+        const core::Mesh& mesh = scene.meshes[scene.instances[i].mesh];
+        for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+            glm::dvec3 p[3];
+            for (int c = 0; c < 3; ++c) {
+                p[c] = glm::dvec3(scene.instances[i].world_from_local *
+                                  glm::dvec4(mesh.positions[mesh.triangles[t][c]], 1.0));
             }
+            emitters.push_back({i, t, glm::dvec3(receiver.position) - p[0], p[1] - p[0], p[2] - p[0]});
+        }
+    }
+    const auto density = [&](const glm::vec3& direction) {
+        const glm::dvec3 back = -glm::dvec3(direction);
+        double sum = 0.0;
+        for (const Emitter& e : emitters) {
+            const glm::dvec3 normal = glm::cross(e.edge1, e.edge2);
+            const double determinant = glm::dot(normal, back);
+            if (std::abs(determinant) < 1e-12) continue;
+            const glm::dvec3 moment = glm::cross(e.to_receiver, back);
+            const double u = -glm::dot(moment, e.edge2) / determinant;
+            const double v = glm::dot(moment, e.edge1) / determinant;
+            const double distance = glm::dot(normal, e.to_receiver) / determinant;
+            if (u < 0 || v < 0 || u + v > 1 || distance <= 0) continue;
+            sum += static_cast<double>(sampler.emitter_pdf(receiver, selection, e.instance, e.triangle,
+                                                           direction, static_cast<float>(distance)));
         }
         return sum;
     };
