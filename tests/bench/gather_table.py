@@ -5,7 +5,7 @@
 
 budget: equal time, by the renderer's clock and by the wall's. truth: cranked up, then each approximation back on;
 small by default (96x72, 16 frames, 8 seeds, of the ledger 4, references of 16,384 samples, the diffuse views of
-assets/), so that it can be run. ablation: each technique off alone, at equal probe rays. effects: auto against all on every scene. proof: a scene that each effect
+assets/; a view may ask for more in views.json), so that it can be run. ablation: each technique off alone, at equal probe rays. effects: auto against all on every scene. proof: a scene that each effect
 is needed in (320x240, 8 seeds). speed: medians by pass of a draft frame. Exit code 1 where a gate fails.
 Errors are relMSE without the reference's noise (and in truth without the gather's), FLIP, energy bias in %.
 """
@@ -40,6 +40,8 @@ LEDGER = {
     "resolution 8": {"screen_probes__resolution": 8},
 }
 LEDGER_SEEDS = 4
+SEEDS = 8
+TRUTH_SPP = 16384
 TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "screen_probes__lighting_pdf",
               "screen_probes__spatial_filter", "screen_probes__clamp_hit_distance", "integrate__bent_normal",
               "screen_probes__jitter_placement", "screen_probes__jitter_directions",
@@ -137,24 +139,28 @@ def truth(run, options):
             continue
         cases = [("triangle", "truth", {})] + ([("sdf", "truth", {})] if not options.no_sdf else [])
         cases += [("triangle", name, change) for name, change in LEDGER.items() if not options.no_ledger]
+        effort = view.get("truth", {})
+        spp = options.reference_spp or effort.get("reference_spp", TRUTH_SPP)
+        most_seeds = options.seeds or effort.get("seeds", SEEDS)
         for tracer, name, change in cases:
-            reference = run.reference(view, tracer)
-            seeds = options.seeds if name == "truth" else min(options.seeds, LEDGER_SEEDS)
+            reference = run.reference(view, tracer, spp=spp)
+            seeds = most_seeds if name == "truth" else min(most_seeds, LEDGER_SEEDS)
             pictures = [run.gather(view, *setting(**{**TRUTH, **change}), tracer=tracer, seed=seed)[0]
                         for seed in range(1, seeds + 1)]
             error, deviation = squared_bias(pictures, reference)
             bias = statistics.mean(run.compare(picture, reference)["energy_bias"] for picture in pictures)
             records.append({"scene": view["name"], "tracer": tracer, "case": name, "rel_mse": error,
-                            "standard_error": deviation, "bias": bias})
-            rows.append([view["name"], tracer, name, f"{error:.1e}", f"{deviation:.1e}", f"{bias:+.3f} %"])
+                            "standard_error": deviation, "bias": bias, "seeds": seeds, "reference_spp": spp})
+            rows.append([view["name"], tracer, name, seeds, f"{spp:,}", f"{error:.1e}", f"{deviation:.1e}",
+                         f"{bias:+.3f} %"])
             if name == "truth" and view["diffuse"] and (error - 2 * deviation > 5e-4 or abs(bias) > 0.5):
                 failed.append(f"{view['name']}, {tracer}: relMSE {error:.1e} +- {deviation:.1e}, bias {bias:+.3f} %")
             if name == "truth" and deviation > 5e-4:
                 failed.append(f"{view['name']}, {tracer}: +- {deviation:.1e} is too noisy to tell; raise --seeds")
-    text = table(["scene", "tracer", "settings", "relMSE, both variances subtracted", "standard error", "bias"], rows)
-    return text + (f"\n\nAt {options.size}, {options.frames} frames, {options.seeds} seeds (of the ledger at most "
-                   f"{LEDGER_SEEDS}), reference {options.reference_spp:,} samples; fields against the path tracer on "
-                   "fields."), records, failed
+    text = table(["scene", "tracer", "settings", "seeds", "reference samples", "relMSE, both variances subtracted",
+                  "standard error", "bias"], rows)
+    return text + (f"\n\nAt {options.size}, {options.frames} frames; fields against the path tracer on fields."), \
+        records, failed
 
 
 def ablation(run, options):
@@ -297,7 +303,7 @@ def main():
                 "speed": speed}
     parser.add_argument("what", choices=commands)
     add_options(parser)
-    parser.add_argument("--seeds", type=int, help="8 of truth (at least 2) and of proof")
+    parser.add_argument("--seeds", type=int, help=f"by default {SEEDS} of proof and of truth (at least 2)")
     parser.add_argument("--no-ledger", action="store_true", help="of truth: its gate alone")
     parser.add_argument("--no-sdf", action="store_true", help="of truth: triangles alone")
     parser.add_argument("--only", help="of proof: effects with commas between")
@@ -305,10 +311,12 @@ def main():
     options = parser.parse_args()
     options.size = options.size or {"truth": "96x72", "effects": "64x48", "proof": "320x240",
                                     "speed": "1280x720"}.get(options.what, "640x360")
-    options.seeds = options.seeds or 8
-    options.reference_spp = options.reference_spp or (16384 if options.what == "truth" else 4096)
-    if options.what == "truth" and options.seeds < 2:
-        parser.error("--seeds is at least 2")
+    if options.what == "truth":  # Which asks the view for what is not said here.
+        if options.seeds is not None and options.seeds < 2:
+            parser.error("--seeds is at least 2")
+    else:
+        options.seeds = options.seeds or SEEDS
+        options.reference_spp = options.reference_spp or 4096
     with tempfile.TemporaryDirectory() as folder:
         text, records, failed = commands[options.what](Runner(options, folder), options)
     print(text)
