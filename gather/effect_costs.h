@@ -27,8 +27,8 @@ struct EffectCost {
 std::array<EffectCost, kEffectCount> effect_costs(const Plan& plan, const std::vector<core::PassCost>& passes,
                                                   int width, int height, const Settings& settings);
 
-/// Bytes a pixel that comparing near light with the probes takes.
-constexpr std::uint64_t kNearLightBytes = sizeof(NearLight) + sizeof(float) + sizeof(ProbeAgreement) +
+/// Bytes a pixel that comparing near light with the probes takes; while pixels share it, there are two.
+constexpr std::uint64_t kNearLightBytes = 2 * sizeof(NearLight) + sizeof(float) + sizeof(ProbeAgreement) +
                                           2 * sizeof(glm::vec3) + Accumulation::kControlBytes + sizeof(float);
 
 /// Most bytes of the probes' cache under this plan.

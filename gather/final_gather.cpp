@@ -210,6 +210,10 @@ void Picture::gather_light(std::uint32_t frame) {
             const NearLighting near{hit_lighting_, atlas_, weights_, history_};
             rays = trace_bent_normals(inputs_, visible_, settings_.integrate, frame, traced ? &near : nullptr,
                                       bent_, near_light_);
+            if (traced) {
+                share_near_light(visible_, settings_.integrate, probes.plane_sharpness, frame, bent_,
+                                 history_, near_light_);
+            }
             return PassRays{rays.short_rays, rays.exhausted};
         });
         if (traced) ledger_.time("bent_normal_shadows", [&] { return PassRays{rays.shadow_rays, 0}; });

@@ -178,16 +178,15 @@ void BentNormalPass::shade(const NearLighting& near, const ShortRays& in, std::v
 void BentNormalPass::compare(const NearLighting& near, const ShortRays& in, std::size_t first,
                              std::size_t last, std::span<const glm::vec3> own, NearLight& light) const {
     const std::size_t pixel = in.pixels[first];
-    ProbeAgreement& agreement = near.history.agreement[pixel];
     // In the open the rays hold what the probes do.
-    if (own.empty() && !(agreement.held > 0.0f)) return;
+    const bool ever_compared = !near.history.agreement.empty() && near.history.agreement[pixel].held > 0.0f;
+    if (own.empty() && !ever_compared) return;
     if (!in.alone[first]) light.kind = NearLight::Kind::kCompared;
     const core::SurfacePoint& point = visible_.points[pixel];
     const glm::vec3 outgoing = point.frame.to_local(visible_.outgoing[pixel]);
     const bool reflects = reflects_near_light(point);
     const ProbeWeights& weights = near.weights[pixel];
     const float share = core::kPi / static_cast<float>(rays_of(pixel, &near));
-    ProbeAgreement sum;
     for (std::size_t i = first; i < last; ++i) {
         const glm::vec3 direction = in.rays.get(i).direction;
         glm::vec3 held(0.0f);
@@ -203,8 +202,8 @@ void BentNormalPass::compare(const NearLighting& near, const ShortRays& in, std:
             own = own.subspan(1);
         }
         const float held_luminance = std::min(core::luminance(held), kMostCompared);
-        sum.found += std::min(core::luminance(found), kMostCompared) * held_luminance;
-        sum.held += held_luminance * held_luminance;
+        light.agreement.found += std::min(core::luminance(found), kMostCompared) * held_luminance;
+        light.agreement.held += held_luminance * held_luminance;
         light.found.irradiance += share * found;
         light.held.irradiance += share * held;
         if (reflects && (found != glm::vec3(0.0f) || held != glm::vec3(0.0f))) {
@@ -214,10 +213,6 @@ void BentNormalPass::compare(const NearLighting& near, const ShortRays& in, std:
             light.held.specular += share * held * lobe;
         }
     }
-    // Frames that found all open, and compared nothing, agreed; their light was about what it is now.
-    const float before = agreement.held > 0.0f ? 0.0f : static_cast<float>(frame_) * sum.held;
-    agreement.found += sum.found + before;
-    agreement.held += sum.held + before;
 }
 
 }  // namespace
@@ -238,8 +233,6 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
     }
     near_light.clear();
     if (near) {
-        near->history.openness.resize(visible.depth.size(), 0.0f);
-        near->history.agreement.resize(visible.depth.size());
         near_light.assign(visible.depth.size(), NearLight{});
         for (std::size_t pixel = 0; pixel < near_light.size(); ++pixel) {
             if (visible.surface(pixel) && !near->weights[pixel].confident) {
@@ -261,13 +254,6 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
         shadow_rays += counters.shadow_rays;
         exhausted += counters.exhausted;
     });
-    if (near) {
-        const float share = 1.0f / static_cast<float>(frame + 1);
-        std::vector<float>& openness = near->history.openness;
-        for (std::size_t pixel = 0; pixel < openness.size(); ++pixel) {
-            openness[pixel] += share * (result[pixel].visibility - openness[pixel]);
-        }
-    }
     return {short_rays, shadow_rays, exhausted};
 }
 

@@ -56,10 +56,10 @@ struct NearLighting {
     const HitLighting& hit_lighting;
     const ProbeAtlas& atlas;
     const std::vector<ProbeWeights>& weights;  ///< A pixel's.
-    NearHistory& history;                      ///< Read, and this frame's rays added.
+    const NearHistory& history;
 };
 
-/// What a pixel's short rays say of its light.
+/// What the short rays of a pixel, and of those about it, say of its light.
 struct NearLight {
     enum class Kind : std::uint8_t {
         kOpen,      ///< Nothing near: its light is the probes'.
@@ -68,11 +68,15 @@ struct NearLight {
     };
     struct Light {
         glm::vec3 irradiance{0.0f};
-        glm::vec3 specular{0.0f};  ///< As radiance: of surfaces that reflects_near_light().
+        glm::vec3 specular{0.0f};  ///< As radiance: of surfaces that reflects_near_light(). Never shared.
     };
-    Light found;  ///< Of the rays' hits, and of the probes where a ray is open.
-    Light held;   ///< Of the probes in all directions of the rays.
+    Light found;               ///< Of the rays' hits, and of the probes where a ray is open.
+    Light held;                ///< Of the probes in all directions of the rays.
+    ProbeAgreement agreement;  ///< Of this frame's own rays.
     Kind kind = Kind::kOpen;
+    /// Of the pixels that share, how many are open and how many compared.
+    float open_share = 1.0f;
+    float compared_share = 0.0f;
 };
 
 /// Whether the specular lobe is wide enough for rays that follow the cosine: smoother ones would speckle.
@@ -92,6 +96,12 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
                                   const IntegrateSettings& settings, std::uint32_t frame,
                                   const NearLighting* near, std::vector<BentNormal>& result,
                                   std::vector<NearLight>& near_light);
+
+/// After a frame's rays: their irradiance becomes a mean, by a tent, over the pixels within
+/// `integrate.near_field_radius` on one plane, and `history` counts them. Contacts blur by as much.
+void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& settings,
+                      float plane_sharpness, std::uint32_t frame, const std::vector<BentNormal>& bent,
+                      NearHistory& history, std::vector<NearLight>& near_light);
 
 /// Ambient occlusion with the light that nearby surfaces of this albedo send back.
 float multi_bounce(float visibility, float albedo);

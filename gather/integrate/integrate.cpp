@@ -19,9 +19,6 @@ namespace {
 
 constexpr std::size_t kPixelsAtOnce = 1024;
 
-/// A pixel that moved may read where its plane weight to itself is at least this.
-constexpr float kSamePlane = 0.5f;
-
 core::ShColor mix_sh(const ProbeAtlas& atlas, const ProbeWeights& weights) {
     core::ShColor sum{};
     for (std::size_t i = 0; i < weights.count; ++i) {
@@ -106,15 +103,6 @@ glm::vec3 directional_reflection(const IntegrateInputs& in, const ProbeWeights& 
     return sum / static_cast<float>(samples);
 }
 
-/// Whether the pixel `there` lies in the plane of a point.
-bool is_same_plane(const IntegrateInputs& in, const core::SurfacePoint& point, float depth,
-                   std::size_t there) {
-    const core::SurfacePoint& other = in.visible.points[there];
-    if (other.triangle == point.triangle && other.instance == point.instance) return true;
-    return surface_weight(point.position, point.geometric_normal, depth, other.position,
-                          other.geometric_normal, in.probes.plane_sharpness) > kSamePlane;
-}
-
 }  // namespace
 
 void IndirectLight::reset(std::size_t pixels, bool controlled) {
@@ -144,7 +132,9 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
                 const glm::ivec2 moved = glm::clamp(at + glm::ivec2(glm::round(offset)), glm::ivec2(0),
                                                     glm::ivec2(visible.width, visible.height) - 1);
                 const std::size_t there = visible.index(moved.x, moved.y);
-                if (visible.surface(there) && is_same_plane(in, point, visible.depth[pixel], there)) {
+                if (visible.surface(there) &&
+                    is_same_plane(point, visible.depth[pixel], visible.points[there],
+                                  in.probes.plane_sharpness)) {
                     reader.pixel = glm::vec2(moved);
                 }
             }
@@ -166,11 +156,9 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
             const glm::vec3 albedo = diffuse_albedo(point.brdf, glm::dot(normal, visible.outgoing[pixel]));
             if (albedo == glm::vec3(0.0f)) continue;
             const glm::vec3 brdf = albedo / core::kPi;
-            const NearLight* near = near_light.empty() ? nullptr : &near_light[pixel];
-            if (near && near->kind == NearLight::Kind::kAlone) {
-                light.diffuse[pixel] += brdf * near->found.irradiance;
-                continue;
-            }
+            const NearLight near = near_light.empty() ? NearLight{} : near_light[pixel];
+            light.diffuse[pixel] += brdf * near.found.irradiance;
+            if (!(near.open_share + near.compared_share > 0.0f)) continue;
             glm::vec3 arriving = irradiance(in, weights[pixel], normal, cosine_weights);
             if (!bent.empty() && bent[pixel].visibility < 1.0f) {
                 const float v = bent[pixel].visibility;
@@ -180,11 +168,11 @@ void integrate_diffuse(const IntegrateInputs& in, const std::vector<ProbeWeights
                 const core::ShColor sh = mix_sh(in.atlas, weights[pixel]);
                 arriving = cone_irradiance(sh, bent[pixel]) + (occlusion - v) * arriving;
             }
-            if (near && near->kind == NearLight::Kind::kCompared) {
-                light.diffuse_control[pixel] += brdf * (arriving - near->held.irradiance);
-                arriving = near->found.irradiance;
+            light.diffuse[pixel] += near.open_share * brdf * arriving;
+            if (near.compared_share > 0.0f) {
+                light.diffuse_control[pixel] +=
+                    brdf * (near.compared_share * arriving - near.held.irradiance);
             }
-            light.diffuse[pixel] += brdf * arriving;
         }
     });
 }

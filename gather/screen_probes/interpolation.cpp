@@ -52,6 +52,14 @@ float surface_weight(const glm::vec3& position, const glm::vec3& normal, float d
            normal_weight(offset, normal, other_normal);
 }
 
+bool is_same_plane(const core::SurfacePoint& point, float depth, const core::SurfacePoint& other,
+                   float sharpness) {
+    constexpr float kSamePlane = 0.5f;
+    if (other.triangle == point.triangle && other.instance == point.instance) return true;
+    return surface_weight(point.position, point.geometric_normal, depth, other.position,
+                          other.geometric_normal, sharpness) > kSamePlane;
+}
+
 ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, float sharpness) {
     ProbeWeights result;
     const auto spacing = static_cast<float>(atlas.spacing);

@@ -13,6 +13,7 @@
 #include <glm/glm.hpp>
 #include <limits>
 
+#include "core/trace/surface.h"
 #include "gather/screen_probes/probe_atlas.h"
 #include "gather/settings.h"
 
@@ -42,6 +43,11 @@ struct ProbeWeights {
 /// @param depth planar, of the first point. @return 0 ... 1
 float surface_weight(const glm::vec3& position, const glm::vec3& normal, float depth, const glm::vec3& other,
                      const glm::vec3& other_normal, float sharpness);
+
+/// Whether light at the one point stands for light at the other, half of it at least.
+/// @param depth planar, of the first
+bool is_same_plane(const core::SurfacePoint& point, float depth, const core::SurfacePoint& other,
+                   float sharpness);
 
 /// Weights of the probes around a point. count is 0 only if no tile around has a probe.
 ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, float sharpness);

@@ -26,12 +26,14 @@ from shared_scenes import scene_files
 TRUTH = {"screen_probes__spacing": 1, "screen_probes__resolution": 16, "screen_probes__importance_sampling": "off",
          "screen_probes__spatial_filter": "off", "screen_probes__jitter_interpolation": "off",
          "integrate__bent_normal": "off", "integrate__diffuse": "sum", "lighting__direct_samples": 16,
-         "lighting__hit_roughness_min": 0, "film__outline_samples": 1, "integrate__reflection_neighbors": 0}
+         "lighting__hit_roughness_min": 0, "film__outline_samples": 1, "integrate__reflection_neighbors": 0,
+         "integrate__near_field_radius": 0}
 LEDGER = {
     "SH3": {"integrate__diffuse": "sh"},
     "filter": {"screen_probes__spatial_filter": "on"},
     "culling, with its filter": {"screen_probes__spatial_filter": "on", "screen_probes__importance_sampling": "on"},
     "bent normal": {"integrate__bent_normal": "on"},
+    "bent normal, shared": {"integrate__bent_normal": "on", "integrate__near_field_radius": 1},
     "bent normal, multi-bounce": {"integrate__bent_normal": "on", "integrate__near_field": "multi_bounce"},
     "jittered interpolation": {"screen_probes__jitter_interpolation": "on"},
     "intensity clamp, 100 cd/m^2": {"screen_probes__max_ray_intensity": 100},
@@ -47,8 +49,9 @@ TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "
               "screen_probes__jitter_placement", "screen_probes__jitter_directions",
               "screen_probes__jitter_interpolation", "temporal__accumulate", "integrate__rough_specular",
               "screen_probes__probe_visibility", "integrate__reflections", "integrate__reflection_neighbors",
-              "film__outline_samples"]
-OFF = {"film__outline_samples": 1, "integrate__reflection_neighbors": 0}  # What is not a switch.
+              "integrate__near_field_radius", "film__outline_samples"]
+# What is not a switch.
+OFF = {"film__outline_samples": 1, "integrate__reflection_neighbors": 0, "integrate__near_field_radius": 0}
 PROBE_PASSES = ("place_probes", "near_field", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
 
 

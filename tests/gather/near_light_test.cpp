@@ -60,6 +60,7 @@ protected:
             std::vector<gather::BentNormal> bent;
             std::vector<gather::NearLight> light;
             gather::trace_bent_normals(inputs, visible_, settings_, frame, &near, bent, light);
+            gather::share_near_light(visible_, settings_, 1e5f, frame, bent, history_, light);
             if (light[0].kind == gather::NearLight::Kind::kCompared) ++compared_;
             sum.found.irradiance += light[0].found.irradiance;
             sum.held.irradiance += light[0].held.irradiance;
@@ -106,6 +107,79 @@ TEST_F(NearLight, AWallBeforeWhatIsDarkAnywayLeavesTheProbesAll) {
     const gather::NearLight sum = trace();
     EXPECT_GT(history_.agreement[0].probe_share(), 0.95f);
     EXPECT_NEAR(sum.found.irradiance.x / sum.held.irradiance.x, 1.0f, 0.1f);
+}
+
+/// Four pixels in a row, two of them compared; what they find is 1 and 4, and the probes held 2 and 8.
+class NearLightSharing : public testing::Test {
+protected:
+    NearLightSharing() : light_(4), bent_(4) {
+        visible_.resize(4, 1);
+        for (std::size_t i = 0; i < 4; ++i) {
+            visible_.depth[i] = 2.0f;
+            core::SurfacePoint& point = visible_.points[i];
+            point.position = {0.01f * static_cast<float>(i), 0, 0};
+            point.geometric_normal = kUp;
+            point.frame = core::ShadingFrame::from_normal(kUp);
+            point.triangle = static_cast<std::uint32_t>(i);
+        }
+        for (const std::size_t i : {0, 1}) {
+            const float scale = i == 0 ? 1.0f : 4.0f;
+            light_[i].kind = gather::NearLight::Kind::kCompared;
+            light_[i].found.irradiance = glm::vec3(scale);
+            light_[i].held.irradiance = glm::vec3(2.0f * scale);
+            light_[i].agreement = {2.0f * scale * scale, 4.0f * scale * scale};
+        }
+    }
+
+    void share(int radius) {
+        gather::IntegrateSettings settings;
+        settings.near_field_radius = radius;
+        gather::share_near_light(visible_, settings, 1e5f, 0, bent_, history_, light_);
+    }
+
+    gather::VisibleSurfaces visible_;
+    std::vector<gather::NearLight> light_;
+    std::vector<gather::BentNormal> bent_;
+    gather::NearHistory history_;
+};
+
+TEST_F(NearLightSharing, IsAMeanByATentOverThePlane) {
+    share(1);
+    EXPECT_FLOAT_EQ(light_[0].found.irradiance.x, (2.0f * 1.0f + 4.0f) / 3.0f);
+    EXPECT_FLOAT_EQ(light_[0].held.irradiance.x, (2.0f * 2.0f + 8.0f) / 3.0f);
+    EXPECT_FLOAT_EQ(light_[0].compared_share, 1.0f);
+    EXPECT_FLOAT_EQ(light_[0].open_share, 0.0f);
+    // The third pixel is open, and lends the probes' light.
+    EXPECT_FLOAT_EQ(light_[1].found.irradiance.x, (1.0f + 2.0f * 4.0f) / 4.0f);
+    EXPECT_FLOAT_EQ(light_[1].compared_share, 0.75f);
+    EXPECT_FLOAT_EQ(light_[1].open_share, 0.25f);
+    EXPECT_FLOAT_EQ(history_.agreement[0].probe_share(), 0.5f);
+    EXPECT_EQ(light_[2].open_share, 1.0f);
+    EXPECT_EQ(light_[2].found.irradiance.x, 0.0f);
+    EXPECT_EQ(history_.agreement[3].held, 0.0f);
+}
+
+TEST_F(NearLightSharing, KeepsToItselfOffThePlaneAndWhereTheRadiusIsZero) {
+    visible_.points[1].position.y = 1.0f;
+    share(1);
+    EXPECT_FLOAT_EQ(light_[0].found.irradiance.x, 1.0f);
+    EXPECT_FLOAT_EQ(light_[1].found.irradiance.x, 4.0f);
+    visible_.points[1].position.y = 0.0f;
+    share(0);
+    EXPECT_FLOAT_EQ(light_[0].found.irradiance.x, 1.0f);
+    EXPECT_FLOAT_EQ(light_[1].found.irradiance.x, 4.0f);
+}
+
+TEST_F(NearLightSharing, APixelWithoutProbesTakesNothingOfThem) {
+    light_[1].kind = gather::NearLight::Kind::kAlone;
+    share(1);
+    EXPECT_FLOAT_EQ(light_[1].found.irradiance.x, (1.0f + 2.0f * 4.0f) / 3.0f);
+    EXPECT_EQ(light_[1].compared_share, 0.0f);
+    EXPECT_EQ(light_[1].open_share, 0.0f);
+    // What it found counts for the other, and no probe's light is set against it.
+    EXPECT_FLOAT_EQ(light_[0].found.irradiance.x, 2.0f);
+    EXPECT_FLOAT_EQ(light_[0].held.irradiance.x, 4.0f / 3.0f);
+    EXPECT_FLOAT_EQ(light_[0].compared_share, 2.0f / 3.0f);
 }
 
 TEST(Accumulation, TakesAShareOfTheControlButNothingBelowZero) {

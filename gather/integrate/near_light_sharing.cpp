@@ -1,0 +1,99 @@
+#include <cstdlib>
+
+#include "core/support/parallel.h"
+#include "gather/integrate/bent_normal.h"
+
+namespace gather {
+
+namespace {
+
+/// Pixels share whose shading normals have at least this cosine: their rays follow about the same one.
+constexpr float kLeastNormalCosine = 0.95f;
+
+/// Near light of some frame, before any is shared.
+class Sharing {
+public:
+    Sharing(const VisibleSurfaces& visible, int radius, float plane_sharpness,
+            const std::vector<NearLight>& own)
+        : visible_(visible), radius_(radius), plane_sharpness_(plane_sharpness), own_(own) {}
+
+    /// @pre own[pixel] is not open. @param agreement set to that of all that share
+    NearLight shared(std::size_t pixel, ProbeAgreement& agreement) const {
+        const auto width = static_cast<std::size_t>(visible_.width);
+        const glm::ivec2 at(pixel % width, pixel / width);
+        const glm::ivec2 from = glm::max(at - radius_, glm::ivec2(0));
+        const glm::ivec2 to = glm::min(at + radius_, glm::ivec2(visible_.width, visible_.height) - 1);
+        const bool alone = own_[pixel].kind == NearLight::Kind::kAlone;
+        NearLight result = own_[pixel];
+        result.found.irradiance = result.held.irradiance = glm::vec3(0.0f);
+        agreement = {};
+        float total = 0.0f, open = 0.0f, compared = 0.0f;
+        for (int y = from.y; y <= to.y; ++y) {
+            for (int x = from.x; x <= to.x; ++x) {
+                const std::size_t there = visible_.index(x, y);
+                if (there != pixel && !share_a_plane(pixel, there)) continue;
+                const NearLight& other = own_[there];
+                // An open one says that the probes are right, and one that is alone has none to ask.
+                if (other.kind == NearLight::Kind::kOpen && alone) continue;
+                const float weight = tent(x - at.x) * tent(y - at.y);
+                total += weight;
+                if (other.kind == NearLight::Kind::kOpen) open += weight;
+                result.found.irradiance += weight * other.found.irradiance;
+                if (other.kind != NearLight::Kind::kCompared || alone) continue;
+                compared += weight;
+                result.held.irradiance += weight * other.held.irradiance;
+                agreement.found += weight * other.agreement.found;
+                agreement.held += weight * other.agreement.held;
+            }
+        }
+        result.found.irradiance /= total;
+        result.held.irradiance /= total;
+        result.open_share = open / total;
+        result.compared_share = compared / total;
+        return result;
+    }
+
+private:
+    float tent(int offset) const { return static_cast<float>(radius_ + 1 - std::abs(offset)); }
+
+    bool share_a_plane(std::size_t pixel, std::size_t there) const {
+        if (!visible_.surface(there)) return false;
+        const core::SurfacePoint& point = visible_.points[pixel];
+        const core::SurfacePoint& other = visible_.points[there];
+        return glm::dot(point.frame.normal, other.frame.normal) >= kLeastNormalCosine &&
+               is_same_plane(point, visible_.depth[pixel], other, plane_sharpness_);
+    }
+
+    const VisibleSurfaces& visible_;
+    int radius_;
+    float plane_sharpness_;
+    const std::vector<NearLight>& own_;
+};
+
+}  // namespace
+
+void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& settings,
+                      float plane_sharpness, std::uint32_t frame, const std::vector<BentNormal>& bent,
+                      NearHistory& history, std::vector<NearLight>& near_light) {
+    const std::vector<NearLight> own = near_light;
+    const Sharing sharing(visible, settings.near_field_radius, plane_sharpness, own);
+    history.openness.resize(own.size(), 0.0f);
+    history.agreement.resize(own.size());
+    const auto frames_before = static_cast<float>(frame);
+    core::parallel_for(own.size(), 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t pixel = begin; pixel < end; ++pixel) {
+            float& openness = history.openness[pixel];
+            openness += (bent[pixel].visibility - openness) / (frames_before + 1.0f);
+            if (!visible.surface(pixel) || own[pixel].kind == NearLight::Kind::kOpen) continue;
+            ProbeAgreement found;
+            near_light[pixel] = sharing.shared(pixel, found);
+            ProbeAgreement& sum = history.agreement[pixel];
+            // Frames that found all open, and compared nothing, agreed; their light was about what it is now.
+            const float before = sum.held > 0.0f ? 0.0f : frames_before * found.held;
+            sum.found += found.found + before;
+            sum.held += found.held + before;
+        }
+    });
+}
+
+}  // namespace gather
