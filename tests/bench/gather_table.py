@@ -73,7 +73,7 @@ PROOF = {
     "screen_probes": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM),
     "adaptive_probes": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
     "lighting_pdf": (DARK_SCENE, LIVING_ROOM_SCENE, 8, LIVING_ROOM_INSIDE),
-    "spatial_filter": (DARK_SCENE, "assets/two_rooms.glb", 2, []),
+    "spatial_filter": (DARK_SCENE, "assets/thin_walls.glb", 2, []),
     "rough_specular": ("assets/cornell_box.glb", STUDIO_SCENE, 8, ["--sun=30,45,30", "--sky=1,1.3,2"]),
     "reflections": ("assets/cornell_box.glb", "assets/glossy.glb", 8, []),
     "bent_normal": (DARK_SCENE, "assets/cornell_box.glb", 8, []),
