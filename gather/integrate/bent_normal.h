@@ -68,7 +68,7 @@ struct NearLight {
     };
     struct Light {
         glm::vec3 irradiance{0.0f};
-        glm::vec3 specular{0.0f};  ///< As radiance: of surfaces that reflects_near_light(). Never shared.
+        glm::vec3 specular{0.0f};  ///< As radiance: of surfaces that reflects_near_light().
     };
     Light found;               ///< Of the rays' hits, and of the probes where a ray is open.
     Light held;                ///< Of the probes in all directions of the rays.
@@ -97,7 +97,7 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
                                   const NearLighting* near, std::vector<BentNormal>& result,
                                   std::vector<NearLight>& near_light);
 
-/// After a frame's rays: their irradiance becomes a mean, by a tent, over the pixels within
+/// After a frame's rays: their light becomes a mean, by a tent, over the pixels within
 /// `integrate.near_field_radius` on one plane, and `history` counts them. Contacts blur by as much.
 void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& settings,
                       float plane_sharpness, std::uint32_t frame, const std::vector<BentNormal>& bent,

@@ -188,19 +188,17 @@ void integrate_specular(const IntegrateInputs& in, const std::vector<ProbeWeight
             if (!core::has_specular(point.brdf)) continue;
             if (modes.reflections && takes_reflection_rays(point, in.settings)) continue;
             const bool has_near = !near_light.empty() && reflects_near_light(point);
-            const NearLight* near = has_near ? &near_light[pixel] : nullptr;
-            if (near && near->kind == NearLight::Kind::kAlone) {
-                light.specular[pixel] += near->found.specular;
-                continue;
+            const NearLight near = has_near ? near_light[pixel] : NearLight{};
+            light.specular[pixel] += near.found.specular;
+            if (!(near.open_share + near.compared_share > 0.0f)) continue;
+            const glm::vec3 arriving =
+                modes.directional && point.roughness <= in.settings.rough_specular_max
+                    ? directional_reflection(in, weights[pixel], point, pixel)
+                    : rough_reflection(in, weights[pixel], point, visible.outgoing[pixel]);
+            light.specular[pixel] += near.open_share * arriving;
+            if (near.compared_share > 0.0f) {
+                light.specular_control[pixel] += near.compared_share * arriving - near.held.specular;
             }
-            glm::vec3 arriving = modes.directional && point.roughness <= in.settings.rough_specular_max
-                                     ? directional_reflection(in, weights[pixel], point, pixel)
-                                     : rough_reflection(in, weights[pixel], point, visible.outgoing[pixel]);
-            if (near && near->kind == NearLight::Kind::kCompared) {
-                light.specular_control[pixel] += arriving - near->held.specular;
-                arriving = near->found.specular;
-            }
-            light.specular[pixel] += arriving;
         }
     });
 }

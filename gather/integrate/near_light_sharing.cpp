@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 #include "core/support/parallel.h"
@@ -9,6 +11,9 @@ namespace {
 
 /// Pixels share whose shading normals have at least this cosine: their rays follow about the same one.
 constexpr float kLeastNormalCosine = 0.95f;
+
+/// Where the lobe reflects what is near, those share whose alpha and f0 differ by no more.
+constexpr float kSameLobe = 0.02f;
 
 /// Near light of some frame, before any is shared.
 class Sharing {
@@ -25,7 +30,7 @@ public:
         const glm::ivec2 to = glm::min(at + radius_, glm::ivec2(visible_.width, visible_.height) - 1);
         const bool alone = own_[pixel].kind == NearLight::Kind::kAlone;
         NearLight result = own_[pixel];
-        result.found.irradiance = result.held.irradiance = glm::vec3(0.0f);
+        result.found = result.held = {};
         agreement = {};
         float total = 0.0f, open = 0.0f, compared = 0.0f;
         for (int y = from.y; y <= to.y; ++y) {
@@ -38,16 +43,18 @@ public:
                 const float weight = tent(x - at.x) * tent(y - at.y);
                 total += weight;
                 if (other.kind == NearLight::Kind::kOpen) open += weight;
-                result.found.irradiance += weight * other.found.irradiance;
+                add(weight, other.found, result.found);
                 if (other.kind != NearLight::Kind::kCompared || alone) continue;
                 compared += weight;
-                result.held.irradiance += weight * other.held.irradiance;
+                add(weight, other.held, result.held);
                 agreement.found += weight * other.agreement.found;
                 agreement.held += weight * other.agreement.held;
             }
         }
-        result.found.irradiance /= total;
-        result.held.irradiance /= total;
+        for (NearLight::Light* light : {&result.found, &result.held}) {
+            light->irradiance /= total;
+            light->specular /= total;
+        }
         result.open_share = open / total;
         result.compared_share = compared / total;
         return result;
@@ -61,7 +68,18 @@ private:
         const core::SurfacePoint& point = visible_.points[pixel];
         const core::SurfacePoint& other = visible_.points[there];
         return glm::dot(point.frame.normal, other.frame.normal) >= kLeastNormalCosine &&
+               (!reflects_near_light(point) || is_same_lobe(point.brdf, other.brdf)) &&
                is_same_plane(point, visible_.depth[pixel], other, plane_sharpness_);
+    }
+
+    static bool is_same_lobe(const core::Brdf& one, const core::Brdf& other) {
+        const glm::vec3 f0 = glm::abs(one.f0 - other.f0);
+        return std::abs(one.alpha - other.alpha) <= kSameLobe && std::max({f0.x, f0.y, f0.z}) <= kSameLobe;
+    }
+
+    static void add(float weight, const NearLight::Light& light, NearLight::Light& sum) {
+        sum.irradiance += weight * light.irradiance;
+        sum.specular += weight * light.specular;
     }
 
     const VisibleSurfaces& visible_;

@@ -170,6 +170,24 @@ TEST_F(NearLightSharing, KeepsToItselfOffThePlaneAndWhereTheRadiusIsZero) {
     EXPECT_FLOAT_EQ(light_[1].found.irradiance.x, 4.0f);
 }
 
+TEST_F(NearLightSharing, LobesThatReflectWhatIsNearShareItAmongTheirLike) {
+    for (std::size_t i = 0; i < 4; ++i) {
+        visible_.points[i].brdf.f0 = glm::vec3(0.5f);
+        visible_.points[i].brdf.alpha = 0.8f;
+    }
+    light_[1].found.specular = glm::vec3(3.0f);
+    const std::vector<gather::NearLight> own = light_;
+    share(1);
+    EXPECT_FLOAT_EQ(light_[0].found.specular.x, 1.0f);
+    EXPECT_FLOAT_EQ(light_[1].found.specular.x, 1.5f);
+    visible_.points[1].brdf.alpha = 0.6f;
+    light_ = own;
+    share(1);
+    EXPECT_EQ(light_[0].found.specular.x, 0.0f);
+    EXPECT_FLOAT_EQ(light_[1].found.specular.x, 3.0f);
+    EXPECT_FLOAT_EQ(light_[0].found.irradiance.x, 1.0f);
+}
+
 TEST_F(NearLightSharing, APixelWithoutProbesTakesNothingOfThem) {
     light_[1].kind = gather::NearLight::Kind::kAlone;
     share(1);
