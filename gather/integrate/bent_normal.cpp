@@ -227,24 +227,19 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
                                   const NearLighting* near, std::vector<BentNormal>& result,
                                   std::vector<NearLight>& near_light) {
     result.resize(visible.depth.size());
-    for (std::size_t pixel = 0; pixel < result.size(); ++pixel) {
-        result[pixel] = {visible.surface(pixel) ? visible.points[pixel].frame.normal : BentNormal{}.direction,
-                         1.0f};
-    }
-    near_light.clear();
-    if (near) {
-        near_light.assign(visible.depth.size(), NearLight{});
-        for (std::size_t pixel = 0; pixel < near_light.size(); ++pixel) {
-            if (visible.surface(pixel) && !near->weights[pixel].confident) {
-                near_light[pixel].kind = NearLight::Kind::kAlone;
-            }
-        }
-    }
+    near_light.resize(near ? visible.depth.size() : 0);
     const BentNormalPass pass(inputs, visible, settings, frame);
     std::atomic<std::uint64_t> short_rays{0}, shadow_rays{0}, exhausted{0};
     core::parallel_for(static_cast<std::size_t>(visible.height), 2, [&](std::size_t begin, std::size_t end) {
         const core::ScopedFlushDenormals flush;
         const auto width = static_cast<std::size_t>(visible.width);
+        for (std::size_t pixel = begin * width; pixel < end * width; ++pixel) {
+            const bool surface = visible.surface(pixel);
+            result[pixel] = {surface ? visible.points[pixel].frame.normal : BentNormal{}.direction, 1.0f};
+            if (!near) continue;
+            near_light[pixel] = {};
+            if (surface && !near->weights[pixel].confident) near_light[pixel].kind = NearLight::Kind::kAlone;
+        }
         ShortRays found;
         pass.trace(begin * width, end * width, near, found);
         pass.bend(found, near, result);

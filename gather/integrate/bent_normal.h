@@ -45,20 +45,6 @@ struct ProbeAgreement {
     float probe_share() const { return held > 0.0f ? std::min(1.0f, found / held) : 1.0f; }
 };
 
-/// What the frames so far found near each pixel; empty before the first.
-struct NearHistory {
-    std::vector<float> openness;  ///< Mean visibility.
-    std::vector<ProbeAgreement> agreement;
-};
-
-/// What `traced` compares: the light of hits with that of the probes.
-struct NearLighting {
-    const HitLighting& hit_lighting;
-    const ProbeAtlas& atlas;
-    const std::vector<ProbeWeights>& weights;  ///< A pixel's.
-    const NearHistory& history;
-};
-
 /// What the short rays of a pixel, and of those about it, say of its light.
 struct NearLight {
     enum class Kind : std::uint8_t {
@@ -77,6 +63,21 @@ struct NearLight {
     /// Of the pixels that share, how many are open and how many compared.
     float open_share = 1.0f;
     float compared_share = 0.0f;
+};
+
+/// What the frames so far found near each pixel; empty before the first.
+struct NearHistory {
+    std::vector<float> openness;  ///< Mean visibility.
+    std::vector<ProbeAgreement> agreement;
+    std::vector<NearLight> before_sharing;  ///< Room to work in.
+};
+
+/// What `traced` compares: the light of hits with that of the probes.
+struct NearLighting {
+    const HitLighting& hit_lighting;
+    const ProbeAtlas& atlas;
+    const std::vector<ProbeWeights>& weights;  ///< A pixel's.
+    const NearHistory& history;
 };
 
 /// Whether the specular lobe is wide enough for rays that follow the cosine: smoother ones would speckle.

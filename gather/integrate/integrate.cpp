@@ -106,10 +106,14 @@ glm::vec3 directional_reflection(const IntegrateInputs& in, const ProbeWeights& 
 }  // namespace
 
 void IndirectLight::reset(std::size_t pixels, bool controlled) {
-    for (auto* light : {&diffuse, &specular}) light->assign(pixels, glm::vec3(0.0f));
-    for (auto* control : {&diffuse_control, &specular_control}) {
-        control->assign(controlled ? pixels : 0, glm::vec3(0.0f));
-    }
+    const std::array<std::vector<glm::vec3>*, 4> all = {&diffuse, &specular, &diffuse_control,
+                                                        &specular_control};
+    for (std::size_t i = 0; i < all.size(); ++i) all[i]->resize(controlled || i < 2 ? pixels : 0);
+    core::parallel_for(pixels, kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+        for (std::vector<glm::vec3>* light : all) {
+            if (!light->empty()) std::fill(light->begin() + begin, light->begin() + end, glm::vec3(0.0f));
+        }
+    });
 }
 
 void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& weights) {

@@ -93,7 +93,9 @@ private:
 void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& settings,
                       float plane_sharpness, std::uint32_t frame, const std::vector<BentNormal>& bent,
                       NearHistory& history, std::vector<NearLight>& near_light) {
-    const std::vector<NearLight> own = near_light;
+    std::vector<NearLight>& own = history.before_sharing;
+    near_light.swap(own);
+    near_light.resize(own.size());
     const Sharing sharing(visible, settings.near_field_radius, plane_sharpness, own);
     history.openness.resize(own.size(), 0.0f);
     history.agreement.resize(own.size());
@@ -102,7 +104,10 @@ void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& s
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
             float& openness = history.openness[pixel];
             openness += (bent[pixel].visibility - openness) / (frames_before + 1.0f);
-            if (!visible.surface(pixel) || own[pixel].kind == NearLight::Kind::kOpen) continue;
+            if (!visible.surface(pixel) || own[pixel].kind == NearLight::Kind::kOpen) {
+                near_light[pixel] = own[pixel];
+                continue;
+            }
             ProbeAgreement found;
             near_light[pixel] = sharing.shared(pixel, found);
             ProbeAgreement& sum = history.agreement[pixel];
