@@ -39,18 +39,8 @@ protected:
 
     std::uint64_t hide(std::span<const float> openness) {
         const core::Camera camera;
-        return gather::hide_probes({.scene = scene_,
-                                    .camera = camera,
-                                    .tracer = tracer_,
-                                    .primary = tracer_,
-                                    .width = 1,
-                                    .height = 1,
-                                    .crop = {},
-                                    .seed = 1,
-                                    .aovs = {},
-                                    .progress = {},
-                                    .stop_requested = {}},
-                                   visible_, atlas_, openness, weights_)
+        return gather::hide_probes(tests::pass_inputs(scene_, tracer_, camera), visible_, atlas_, openness,
+                                   weights_)
             .rays;
     }
 

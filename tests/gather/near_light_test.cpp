@@ -45,17 +45,7 @@ protected:
         gather::NearLight sum;
         for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
             const core::Camera camera;
-            const core::RenderInputs inputs{.scene = scene_,
-                                            .camera = camera,
-                                            .tracer = tracer_,
-                                            .primary = tracer_,
-                                            .width = 1,
-                                            .height = 1,
-                                            .crop = {},
-                                            .seed = 1,
-                                            .aovs = {},
-                                            .progress = {},
-                                            .stop_requested = {}};
+            const core::RenderInputs inputs = tests::pass_inputs(scene_, tracer_, camera);
             const gather::NearLighting near{hit_lighting_, atlas_, weights_, history_};
             std::vector<gather::BentNormal> bent;
             std::vector<gather::NearLight> light;

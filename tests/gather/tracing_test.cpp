@@ -10,6 +10,7 @@
 #include "core/trace/triangle_tracer.h"
 #include "gather/screen_probes/placement.h"
 #include "tests/support/analytic_scenes.h"
+#include "tests/support/gather_pictures.h"
 
 namespace {
 
@@ -25,17 +26,7 @@ TEST(ProbeTracing, AlongTheHorizonNoTexelHoldsMuchMoreThanArrives) {
     const core::Scene scene = black_ball();
     const core::TriangleTracer tracer(scene);
     const core::Camera camera = core::look_at({0.0, 0.0, 4.0}, {0.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, 0.6);
-    const core::RenderInputs inputs{.scene = scene,
-                                    .camera = camera,
-                                    .tracer = tracer,
-                                    .primary = tracer,
-                                    .width = 64,
-                                    .height = 64,
-                                    .crop = {},
-                                    .seed = 1,
-                                    .aovs = {},
-                                    .progress = {},
-                                    .stop_requested = {}};
+    const core::RenderInputs inputs = tests::pass_inputs(scene, tracer, camera, 64);
     gather::ScreenProbeSettings settings;
     settings.spacing = 2;
     gather::LightingSettings light;

@@ -28,6 +28,22 @@ inline core::Camera camera_of(const core::Scene& scene) {
                                  : scene.cameras.front();
 }
 
+/// What a pass of the gather reads, of a picture of `size` x `size` pixels. Keeps references.
+inline core::RenderInputs pass_inputs(const core::Scene& scene, const core::Tracer& tracer,
+                                      const core::Camera& camera, int size = 1) {
+    return {.scene = scene,
+            .camera = camera,
+            .tracer = tracer,
+            .primary = tracer,
+            .width = size,
+            .height = size,
+            .crop = {},
+            .seed = 1,
+            .aovs = {},
+            .progress = {},
+            .stop_requested = {}};
+}
+
 struct GatherRequest {
     int width = 64;
     int height = 48;
