@@ -158,7 +158,7 @@ const std::vector<Knob>& knobs() {
                {{"traced", NearField::kTraced}, {"multi_bounce", NearField::kMultiBounce}},
                "light of what the short rays hit: its own, or occlusion and an estimate"),
         number("integrate.near_field_radius", kI, &I::near_field_radius, 0, 8,
-               "pixels; those about one on its plane share their short rays"),
+               "pixels within it on one plane share their short rays"),
         number("integrate.near_field_albedo_max", kI, &I::near_field_albedo_max, 0.0f, 1.0f,
                "caps the albedo in the multi-bounce approximation"),
         flag("temporal.accumulate", &Settings::temporal, &TemporalSettings::accumulate,

@@ -78,7 +78,7 @@ struct IntegrateSettings {
     int bent_normal_rays = 4;               ///< A pixel a frame. 1 ... 64.
     float bent_normal_pixels = 16.0f;       ///< Length of those rays on the screen. 1 ... 64.
     NearField near_field = NearField::kTraced;
-    int near_field_radius = 1;           ///< Pixels; those about it on its plane share their rays. 0 ... 8.
+    int near_field_radius = 1;           ///< Pixels within it on one plane share their rays. 0 ... 8.
     float near_field_albedo_max = 0.5f;  ///< Caps the albedo in the multi-bounce estimate. 0 ... 1.
 };
 
