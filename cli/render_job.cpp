@@ -65,6 +65,7 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
         {"samples_per_pixel", frame.samples_per_pixel},
         {"passes", passes},
         {"rays", frame.rays},
+        {"clamped_share", frame.clamped_share},
         {"rays_per_pixel", static_cast<double>(frame.rays) / pixel_count},
         {"sdf", {{"rays", fields.rays}, {"steps", fields.steps}, {"exhausted", fields.exhausted}}},
         {"memory",
@@ -247,6 +248,11 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
                              {"write", write_seconds}};
     statistics["saturated"] = saturated;
     if (!options.stats.empty()) core::write_text_atomically(options.stats, statistics.dump(2) + "\n");
+    if (frame.clamped_share > 0.0) {
+        warn(program, fmt::format("screen_probes.max_ray_intensity took off {:.2g} % of the light that probe "
+                                  "rays brought, and the picture is as much darker where they count",
+                                  100.0 * frame.clamped_share));
+    }
     if (frame.exhausted_rays > 0) {
         warn(program, fmt::format("{} rays ran out of steps and count as black", frame.exhausted_rays));
     }

@@ -17,13 +17,18 @@ std::vector<std::string_view> passes_of(Effect effect) {
         case Effect::kPunctualLights:
         case Effect::kSun:
         case Effect::kEmissiveSampling:
-            return {"direct", "probe_shadows"};
+            return {"outline_shadows", "direct", "probe_shadows", "bent_normal_shadows",
+                    "reflection_shadows"};
         case Effect::kSky:
-            return {"primary", "direct", "trace_probes", "probe_shadows"};
+            return {"primary",      "outlines",          "outline_shadows", "direct",
+                    "trace_probes", "probe_shadows",     "bent_normal",     "bent_normal_shadows",
+                    "reflections",  "reflection_shadows"};
         case Effect::kAlphaMask:
         case Effect::kAlphaBlend:
-            return {"primary",       "direct",      "trace_probes",
-                    "probe_shadows", "bent_normal", "bent_normal_shadows"};
+            return {"primary",          "outlines",          "outline_shadows",
+                    "direct",           "trace_probes",      "probe_shadows",
+                    "probe_visibility", "bent_normal",       "bent_normal_shadows",
+                    "reflections",      "reflection_shadows"};
         case Effect::kScreenProbes:
             return {"place_probes", "trace_probes", "probe_shadows", "integrate", "probe_visibility"};
         case Effect::kAdaptiveProbes:
@@ -105,6 +110,14 @@ std::uint64_t probe_cache_bytes(const Plan& plan, int width, int height, const S
     for (const Effect effect :
          {Effect::kScreenProbes, Effect::kAdaptiveProbes, Effect::kLightingPdf, Effect::kSpatialFilter}) {
         sum += bytes_of(effect, plan, width, height, settings);
+    }
+    return sum;
+}
+
+std::uint64_t effect_bytes(const Plan& plan, int width, int height, const Settings& settings) {
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < kEffectCount; ++i) {
+        sum += bytes_of(static_cast<Effect>(i), plan, width, height, settings);
     }
     return sum;
 }

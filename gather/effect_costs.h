@@ -28,10 +28,13 @@ std::array<EffectCost, kEffectCount> effect_costs(const Plan& plan, const std::v
                                                   int width, int height, const Settings& settings);
 
 /// Bytes a pixel that comparing near light with the probes takes; while pixels share it, there are two.
-constexpr std::uint64_t kNearLightBytes = 2 * sizeof(NearLight) + sizeof(float) + sizeof(ProbeAgreement) +
+constexpr std::uint64_t kNearLightBytes = 2 * sizeof(NearLight) + sizeof(float) + sizeof(ProbeAgreement) + 2 +
                                           2 * sizeof(glm::vec3) + Accumulation::kControlBytes + sizeof(float);
 
 /// Most bytes of the probes' cache under this plan.
 std::uint64_t probe_cache_bytes(const Plan& plan, int width, int height, const Settings& settings);
+
+/// Most bytes of all effects that are on.
+std::uint64_t effect_bytes(const Plan& plan, int width, int height, const Settings& settings);
 
 }  // namespace gather

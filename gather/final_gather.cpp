@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/support/error.h"
@@ -77,11 +78,12 @@ public:
           mirrored_lighting_(inputs.scene, inputs.tracer, lighting_,
                              settings.bounces > 0 && !lighting_.everything().empty(), 0.0f,
                              settings.lighting.hit_roughness_min),
-          table_(settings.screen_probes.resolution),
           outlines_(inputs.width, inputs.height,
                     plan.on(Effect::kTemporal) ? settings.film.outline_samples : 1),
           accumulation_(inputs.width, inputs.height, inputs.aovs, compares_near_light()),
-          ledger_(inputs.stop_requested) {}
+          ledger_(inputs.stop_requested) {
+        if (plan.on(Effect::kScreenProbes)) table_.emplace(settings.screen_probes.resolution);
+    }
 
     /// The frame as an ordered list of passes.
     void render_frame(std::uint32_t frame) {
@@ -124,8 +126,12 @@ private:
     void gather_light(std::uint32_t frame);
     SpecularReaders specular_readers() const;
     void trace_smooth(std::uint32_t frame);
+    template <bool kGathers, bool kCompares>
     FramePixel frame_pixel(std::size_t pixel) const;
+    template <bool kGathers, bool kCompares>
     FramePixel outline_pixel(const OutlineSample& sample) const;
+    template <bool kGathers, bool kCompares>
+    void accumulate_pixels();
     void accumulate();
     void add_probe_layers(core::Image& image) const;
 
@@ -135,7 +141,7 @@ private:
     SceneLighting lighting_;
     HitLighting hit_lighting_;
     HitLighting mirrored_lighting_;  ///< As sharp as it is: such rays stand for one pixel, not for a probe's.
-    TexelTable table_;
+    std::optional<TexelTable> table_;  ///< Where there are probes.
     Outlines outlines_;
     Accumulation accumulation_;
     Ledger ledger_;
@@ -146,6 +152,7 @@ private:
     ReflectionRays reflection_rays_;
     ProbeAtlas atlas_, last_atlas_;
     bool has_last_ = false;
+    double probe_light_ = 0.0, clamped_light_ = 0.0;  ///< Of all frames; see ProbeTraceCost.
     std::vector<ProbeWeights> weights_;
     std::vector<BentNormal> bent_;
     std::vector<NearLight> near_light_;
@@ -171,13 +178,15 @@ void Picture::gather_light(std::uint32_t frame) {
                              .visible = visible_,
                              .lighting = lighting_,
                              .hit_lighting = hit_lighting_,
-                             .table = table_,
+                             .table = *table_,
                              .settings = probes,
                              .last = has_last_ ? &last_atlas_ : nullptr,
                              .cull = probes.importance_sampling && filtered,
                              .specular_readers = directional ? specular_readers() : SpecularReaders{},
                              .frame = frame},
                             atlas_);
+        probe_light_ += cost.light;
+        clamped_light_ += cost.clamped;
         return PassRays{cost.probe_rays, cost.exhausted};
     });
     ledger_.time("probe_shadows", [&] { return PassRays{cost.shadow_rays, 0}; });
@@ -191,18 +200,19 @@ void Picture::gather_light(std::uint32_t frame) {
     }
     if (filtered) {
         ledger_.time("filter_probes", [&] {
-            filter_probes(probes, table_, atlas_);
+            filter_probes(probes, *table_, atlas_);
             return PassRays{};
         });
     }
-    const IntegrateInputs in{visible_, atlas_, table_, probes, settings_.integrate, inputs_.seed, frame};
+    const IntegrateInputs in{visible_, atlas_, *table_, probes, settings_.integrate, inputs_.seed, frame};
     ledger_.time("integrate", [&] {
         interpolate_probes(in, weights_);
         return PassRays{};
     });
     if (probes.probe_visibility && probes.spacing > 1) {
-        ledger_.time("probe_visibility",
-                     [&] { return hide_probes(inputs_, visible_, atlas_, history_.openness, weights_); });
+        ledger_.time("probe_visibility", [&] {
+            return hide_probes(inputs_, visible_, atlas_, history_.openness, frame, weights_);
+        });
     }
     if (bent) {
         BentNormalRays rays;
@@ -220,7 +230,7 @@ void Picture::gather_light(std::uint32_t frame) {
     }
     ledger_.time("integrate", [&] {
         const bool cone = bent && !traced;
-        if (cone || settings_.integrate.diffuse == DiffuseIntegral::kSh) project_to_sh(table_, atlas_);
+        if (cone || settings_.integrate.diffuse == DiffuseIntegral::kSh) project_to_sh(*table_, atlas_);
         static const std::vector<BentNormal> kOpen;
         indirect_.reset(visible_.depth.size(), compares_near_light());
         integrate_diffuse(in, weights_, cone ? bent_ : kOpen, near_light_, indirect_);
@@ -252,6 +262,8 @@ void Picture::trace_smooth(std::uint32_t frame) {
     });
 }
 
+/// @tparam kGathers whether there are probes @tparam kCompares whether near light is compared with them
+template <bool kGathers, bool kCompares>
 FramePixel Picture::frame_pixel(std::size_t pixel) const {
     FramePixel value;
     value.direct = visible_.emitted[pixel] + direct_[pixel];
@@ -264,10 +276,10 @@ FramePixel Picture::frame_pixel(std::size_t pixel) const {
     value.normal = point.frame.normal;
     value.albedo = core::approximate_albedo(point.brdf);
     value.bent_normal = bent_.empty() ? point.frame.normal : bent_[pixel].direction;
-    if (plan_.on(Effect::kScreenProbes)) {
+    if constexpr (kGathers) {
         value.indirect_diffuse = indirect_.diffuse[pixel];
         value.indirect_specular = indirect_.specular[pixel];
-        if (compares_near_light()) {
+        if constexpr (kCompares) {
             value.diffuse_control = indirect_.diffuse_control[pixel];
             value.specular_control = indirect_.specular_control[pixel];
         }
@@ -276,31 +288,47 @@ FramePixel Picture::frame_pixel(std::size_t pixel) const {
     return value;
 }
 
+template <bool kGathers, bool kCompares>
 FramePixel Picture::outline_pixel(const OutlineSample& sample) const {
     FramePixel value;
-    if (sample.source != OutlineSample::kSky) {
-        value = frame_pixel(sample.source);
+    if (sample.source < OutlineSample::kAlone) {
+        value = frame_pixel<kGathers, kCompares>(sample.source);
         value.indirect_diffuse *= sample.tint;
         value.indirect_specular *= sample.tint;
         value.diffuse_control *= sample.tint;
         value.specular_control *= sample.tint;
-        value.albedo *= sample.tint;
     }
+    value.surface = sample.source != OutlineSample::kSky;
+    value.depth = sample.depth;
+    value.distance = sample.distance;
+    value.normal = sample.normal;
+    value.albedo = sample.albedo;
     value.direct = sample.direct;
     value.steps = static_cast<float>(sample.steps);
     return value;
 }
 
-void Picture::accumulate() {
+template <bool kGathers, bool kCompares>
+void Picture::accumulate_pixels() {
     core::parallel_for(visible_.depth.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t pixel = begin; pixel < end; ++pixel) accumulation_.add(pixel, frame_pixel(pixel));
+        for (std::size_t pixel = begin; pixel < end; ++pixel)
+            accumulation_.add(pixel, frame_pixel<kGathers, kCompares>(pixel));
     });
     outlines_.for_pixels([&](std::span<const OutlineSample> samples) {
         for (const OutlineSample& sample : samples) {
-            if (sample.source != OutlineSample::kAlone)
-                accumulation_.add(sample.pixel, outline_pixel(sample));
+            accumulation_.add(sample.pixel, outline_pixel<kGathers, kCompares>(sample));
         }
     });
+}
+
+void Picture::accumulate() {
+    if (compares_near_light()) {
+        accumulate_pixels<true, true>();
+    } else if (plan_.on(Effect::kScreenProbes)) {
+        accumulate_pixels<true, false>();
+    } else {
+        accumulate_pixels<false, false>();
+    }
     outlines_.end_frame(visible_);
 }
 
@@ -357,6 +385,7 @@ core::Frame Picture::finish(int frame_count) {
     frame.passes = ledger_.passes();
     for (const core::PassCost& pass : frame.passes) frame.rays += pass.rays;
     frame.exhausted_rays = ledger_.exhausted();
+    frame.clamped_share = clamped_light_ > 0.0 ? clamped_light_ / probe_light_ : 0.0;
     frame.samples_per_pixel = frame_count;
     return frame;
 }
@@ -382,10 +411,9 @@ std::uint64_t FinalGather::picture_bytes(int width, int height, const Settings& 
     const std::uint64_t pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
     Plan everything;
     for (PlannedEffect& effect : everything.effects) effect.on = true;
-    return probe_cache_bytes(everything, width, height, settings) + Accumulation::bytes(width, height, aovs) +
+    return effect_bytes(everything, width, height, settings) + Accumulation::bytes(width, height, aovs) +
            Outlines::bytes(width, height, settings.film.outline_samples) +
-           pixels * (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + kNearLightBytes + sizeof(ProbeWeights) +
-                     sizeof(BentNormal));
+           pixels * (kVisibleSurfaceBytes + 3 * sizeof(glm::vec3) + sizeof(ProbeWeights));
 }
 
 core::Frame FinalGather::render(const core::RenderInputs& inputs) {

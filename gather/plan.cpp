@@ -194,9 +194,9 @@ Plan Planner::make() {
                forbid(effect, !setting, fmt::format("{} is off", name));
     };
     if (!depends(Effect::kAdaptiveProbes, probes.adaptive, "screen_probes.adaptive")) {
-        const bool room = probes.adaptive_budget > 0.0f && probes.spacing > 1;
+        const bool room = probes.adaptive_budget > 0.0f && probes.spacing > 2;
         decide(Effect::kAdaptiveProbes, room, "edges may leave pixels without a probe in their plane",
-               "the budget is 0 or every pixel has a probe",
+               "the budget is 0, or every second pixel of a row has a probe already",
                fmt::format("at most {:.0f} further probes",
                            static_cast<double>(probes.adaptive_budget) * static_cast<double>(tiles)));
     }

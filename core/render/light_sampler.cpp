@@ -13,12 +13,48 @@ namespace core {
 namespace {
 
 /// Barycentrics at which a textured triangle's emission is averaged to weigh it. A texture brighter between
-/// them only costs noise: hits find what sampling does not.
+/// them only costs noise.
 constexpr int kEmissionProbesPerSide = 4;
+
+/// Of the luminance of white: what a textured triangle is taken to emit at least, for the texture may be
+/// bright between the probes. A quarter of what one probe weighs.
+constexpr float kLeastTexturedShare = 1.0f / (4 * kEmissionProbesPerSide * kEmissionProbesPerSide);
+
+bool is_textured_emitter(const Material& material) {
+    return material.unlit || material.emission_texture.present();
+}
+
+/// @return 0 where all of the texture is black
+float least_emission_luminance(const Scene& scene, const Material& material) {
+    const glm::vec3 white = material.unlit ? glm::vec3(material.base_color) : material.emission;
+    const TextureUse& use = material.unlit ? material.base_color_texture : material.emission_texture;
+    const float least = kLeastTexturedShare * luminance(white);
+    if (!use.present()) return least;
+    const std::vector<std::uint8_t>& texels =
+        scene.images[scene.textures[static_cast<std::size_t>(use.texture)].image].rgba;
+    for (std::size_t i = 0; i + 3 < texels.size(); i += 4) {
+        for (int c = 0; c < 3; ++c) {
+            if (texels[i + static_cast<std::size_t>(c)] > 0 && white[c] > 0.0f) return least;
+        }
+    }
+    return 0.0f;
+}
+
+/// By material; 0 for those without a texture, whose emission is known.
+std::vector<float> least_emission_luminances(const Scene& scene) {
+    std::vector<float> result(scene.materials.size(), 0.0f);
+    for (std::size_t i = 0; i < result.size(); ++i) {
+        const Material& material = scene.materials[i];
+        if (material.emissive() && is_textured_emitter(material)) {
+            result[i] = least_emission_luminance(scene, material);
+        }
+    }
+    return result;
+}
 
 float mean_emission_luminance(const Scene& scene, const Mesh& mesh, const Material& material,
                               std::uint32_t triangle) {
-    if (!material.emission_texture.present() && !material.unlit) return luminance(material.emission);
+    if (!is_textured_emitter(material)) return luminance(material.emission);
     double sum = 0.0;
     for (int i = 0; i < kEmissionProbesPerSide; ++i) {
         for (int j = 0; j < kEmissionProbesPerSide; ++j) {
@@ -59,10 +95,12 @@ LightSampler::LightSampler(const Scene& scene, const LightSubset& subset)
         escaped_groups_.push_back(static_cast<std::uint32_t>(groups_.size()));
         groups_.push_back({Kind::kSky, 0, glm::vec3(0.0f), 0.0f, kPi * sky_->mean_luminance()});
     }
-    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) add_emitter(i, subset.emitters[i] != 0);
+    const std::vector<float> least = least_emission_luminances(scene);
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) add_emitter(i, subset.emitters[i] != 0, least);
 }
 
-void LightSampler::add_emitter(std::uint32_t instance_index, bool sampled) {
+void LightSampler::add_emitter(std::uint32_t instance_index, bool sampled,
+                               std::span<const float> least_emission) {
     const Instance& instance = scene_.instances[instance_index];
     const Mesh& mesh = scene_.meshes[instance.mesh];
     Emitter emitter;
@@ -72,7 +110,8 @@ void LightSampler::add_emitter(std::uint32_t instance_index, bool sampled) {
     double power_over_pi = 0.0;
     for (std::size_t part_index = 0; part_index < mesh.parts.size(); ++part_index) {
         const MeshPart& part = mesh.parts[part_index];
-        const Material& material = scene_.materials[instance.materials[part_index]];
+        const std::uint32_t material_index = instance.materials[part_index];
+        const Material& material = scene_.materials[material_index];
         if (!material.emissive()) continue;
         may_emit_[instance_index] = 1;
         if (!sampled) continue;
@@ -87,7 +126,8 @@ void LightSampler::add_emitter(std::uint32_t instance_index, bool sampled) {
             const double length = glm::length(cross);
             const float area = static_cast<float>(0.5 * length);
             if (!(area > 0.0f)) continue;
-            const float power = mean_emission_luminance(scene_, mesh, material, t) * area;
+            const float power = area * std::max(mean_emission_luminance(scene_, mesh, material, t),
+                                                least_emission[material_index]);
             if (!(power > 0.0f)) continue;
             if (emitter.entry_of_triangle.empty())
                 emitter.entry_of_triangle.assign(mesh.triangles.size(), kNoIndex);

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "core/math/sampling.h"
@@ -105,7 +106,8 @@ private:
         Distribution1D distribution;                   ///< Over `triangles`, by power.
     };
 
-    void add_emitter(std::uint32_t instance, bool sampled);
+    /// @param least_emission by material, luminance
+    void add_emitter(std::uint32_t instance, bool sampled, std::span<const float> least_emission);
     /// A group and its probability; null: none can send light. `remainder` is u_group stretched to [0, 1)
     /// over the group's share.
     struct Choice {

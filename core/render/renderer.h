@@ -48,6 +48,7 @@ struct Frame {
     double samples_per_pixel = 0.0;
     std::uint64_t rays = 0;
     std::uint64_t exhausted_rays = 0;
+    double clamped_share = 0.0;  ///< Of the light that gathering rays brought: taken off by a clamp, a bias.
 };
 
 /// Makes pictures. Implementations are deterministic: same inputs, same bits, at any thread count.

@@ -119,7 +119,9 @@ void BentNormalPass::trace(std::size_t first, std::size_t last, const NearLighti
     }
     inputs_.tracer.trace_closest(out.rays, out.hits);
     for (std::size_t i = 0; i < out.pixels.size(); ++i) {
-        out.occluded[i] = out.hits.status[i] == core::HitStatus::kHit && out.hits.t[i] <= lengths[i] ? 1 : 0;
+        // One that was exhausted met something that it could not tell: black, and counted, as elsewhere.
+        const bool met = out.hits.status[i] == core::HitStatus::kHit && out.hits.t[i] <= lengths[i];
+        out.occluded[i] = met || out.hits.status[i] == core::HitStatus::kExhausted ? 1 : 0;
     }
 }
 
@@ -179,7 +181,7 @@ void BentNormalPass::compare(const NearLighting& near, const ShortRays& in, std:
                              std::size_t last, std::span<const glm::vec3> own, NearLight& light) const {
     const std::size_t pixel = in.pixels[first];
     // In the open the rays hold what the probes do.
-    const bool ever_compared = !near.history.agreement.empty() && near.history.agreement[pixel].held > 0.0f;
+    const bool ever_compared = !near.history.compared.empty() && near.history.compared[pixel];
     if (own.empty() && !ever_compared) return;
     if (!in.alone[first]) light.kind = NearLight::Kind::kCompared;
     const core::SurfacePoint& point = visible_.points[pixel];

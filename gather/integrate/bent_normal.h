@@ -68,8 +68,12 @@ struct NearLight {
 /// What the frames so far found near each pixel; empty before the first.
 struct NearHistory {
     std::vector<float> openness;  ///< Mean visibility.
+    /// Of all that shared. held is 0 where no pixel about was compared yet.
     std::vector<ProbeAgreement> agreement;
-    std::vector<NearLight> before_sharing;  ///< Room to work in.
+    std::vector<std::uint8_t> compared;  ///< 1: a frame compared the pixel's own rays.
+    // Room to work in.
+    std::vector<NearLight> before_sharing;
+    std::vector<std::uint8_t> compared_in_row;
 };
 
 /// What `traced` compares: the light of hits with that of the probes.
@@ -99,7 +103,8 @@ BentNormalRays trace_bent_normals(const core::RenderInputs& inputs, const Visibl
                                   std::vector<NearLight>& near_light);
 
 /// After a frame's rays: their light becomes a mean, by a tent, over the pixels within
-/// `integrate.near_field_radius` on one plane, and `history` counts them. Contacts blur by as much.
+/// `integrate.near_field_radius` on one plane, and `history` counts them. Contacts blur by as much. What one
+/// pixel finds the open ones about it share, too: away from borders nothing is lost.
 void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& settings,
                       float plane_sharpness, std::uint32_t frame, const std::vector<BentNormal>& bent,
                       NearHistory& history, std::vector<NearLight>& near_light);

@@ -22,7 +22,7 @@ public:
             const std::vector<NearLight>& own)
         : visible_(visible), radius_(radius), plane_sharpness_(plane_sharpness), own_(own) {}
 
-    /// @pre own[pixel] is not open. @param agreement set to that of all that share
+    /// @param agreement set to that of all that share
     NearLight shared(std::size_t pixel, ProbeAgreement& agreement) const {
         const auto width = static_cast<std::size_t>(visible_.width);
         const glm::ivec2 at(pixel % width, pixel / width);
@@ -88,6 +88,39 @@ private:
     const std::vector<NearLight>& own_;
 };
 
+/// By pixel: whether any of its row within `radius` was compared.
+void find_compared_in_row(const VisibleSurfaces& visible, const std::vector<NearLight>& own, int radius,
+                          std::vector<std::uint8_t>& result) {
+    result.resize(own.size());
+    const auto width = static_cast<std::size_t>(visible.width);
+    core::parallel_for(static_cast<std::size_t>(visible.height), 16, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t y = begin; y < end; ++y) {
+            const std::size_t first = y * width, last = first + width;
+            std::fill(result.begin() + static_cast<std::ptrdiff_t>(first),
+                      result.begin() + static_cast<std::ptrdiff_t>(last), std::uint8_t{0});
+            for (std::size_t pixel = first; pixel < last; ++pixel) {
+                if (own[pixel].kind != NearLight::Kind::kCompared) continue;
+                const std::size_t reach = static_cast<std::size_t>(radius);
+                const std::size_t from = pixel - std::min(reach, pixel - first);
+                const std::size_t to = std::min(pixel + reach + 1, last);
+                std::fill(result.begin() + static_cast<std::ptrdiff_t>(from),
+                          result.begin() + static_cast<std::ptrdiff_t>(to), std::uint8_t{1});
+            }
+        }
+    });
+}
+
+/// @param compared_in_row as find_compared_in_row() finds it
+bool is_beside_compared(const VisibleSurfaces& visible, std::size_t pixel, int radius,
+                        const std::vector<std::uint8_t>& compared_in_row) {
+    const auto width = static_cast<std::size_t>(visible.width);
+    const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
+    for (int row = std::max(0, y - radius); row <= std::min(y + radius, visible.height - 1); ++row) {
+        if (compared_in_row[visible.index(x, row)]) return true;
+    }
+    return false;
+}
+
 }  // namespace
 
 void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& settings,
@@ -99,12 +132,19 @@ void share_near_light(const VisibleSurfaces& visible, const IntegrateSettings& s
     const Sharing sharing(visible, settings.near_field_radius, plane_sharpness, own);
     history.openness.resize(own.size(), 0.0f);
     history.agreement.resize(own.size());
+    history.compared.resize(own.size(), 0);
+    const int radius = settings.near_field_radius;
+    find_compared_in_row(visible, own, radius, history.compared_in_row);
     const auto frames_before = static_cast<float>(frame);
     core::parallel_for(own.size(), 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
             float& openness = history.openness[pixel];
             openness += (bent[pixel].visibility - openness) / (frames_before + 1.0f);
-            if (!visible.surface(pixel) || own[pixel].kind == NearLight::Kind::kOpen) {
+            if (own[pixel].kind == NearLight::Kind::kCompared) history.compared[pixel] = 1;
+            // What is open far and wide, as most is, has nothing to share.
+            const bool open = own[pixel].kind == NearLight::Kind::kOpen;
+            if (!visible.surface(pixel) ||
+                (open && !is_beside_compared(visible, pixel, radius, history.compared_in_row))) {
                 near_light[pixel] = own[pixel];
                 continue;
             }

@@ -1,6 +1,7 @@
 #include "gather/lighting/outlines.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <limits>
 #include <optional>
@@ -59,26 +60,33 @@ void for_neighbours(const VisibleSurfaces& visible, std::size_t pixel, const Vis
 }
 
 /// The sample around `pixel` whose light stands for that of `point`: the nearest on its surface, or, where
-/// its surface is as thin as a leaf's edge, the nearest on its instance.
+/// its surface is as thin as a leaf's edge, the nearest on its instance, or, where that is as thin as a
+/// wire, the nearest of all.
 std::optional<std::size_t> find_source(const VisibleSurfaces& visible, std::size_t pixel,
                                        const core::SurfacePoint& point) {
-    std::optional<std::size_t> nearest, nearest_of_instance;
-    float least = std::numeric_limits<float>::infinity();
-    float least_of_instance = least;
+    enum Likeness { kAny, kInstance, kSurface, kLikenesses };
+    std::array<std::optional<std::size_t>, kLikenesses> nearest;
+    std::array<float, kLikenesses> least;
+    least.fill(std::numeric_limits<float>::infinity());
     for_neighbours(visible, pixel, [&](std::size_t other) {
-        if (!visible.surface(other) || visible.points[other].instance != point.instance) return;
-        const glm::vec3 offset = visible.points[other].position - point.position;
+        if (!visible.surface(other)) return;
+        const core::SurfacePoint& candidate = visible.points[other];
+        const glm::vec3 offset = candidate.position - point.position;
         const float distance2 = glm::dot(offset, offset);
-        if (distance2 < least_of_instance) {
-            least_of_instance = distance2;
-            nearest_of_instance = other;
-        }
-        if (distance2 < least && same_surface(point, visible.points[other])) {
-            least = distance2;
-            nearest = other;
+        const bool same_instance = candidate.instance == point.instance;
+        const std::size_t likeness = same_surface(point, candidate) ? kSurface
+                                     : same_instance                ? kInstance
+                                                                    : kAny;
+        for (std::size_t i = 0; i <= likeness; ++i) {
+            if (!(distance2 < least[i])) continue;
+            least[i] = distance2;
+            nearest[i] = other;
         }
     });
-    return nearest ? nearest : nearest_of_instance;
+    for (std::size_t i = kLikenesses; i-- > 0;) {
+        if (nearest[i]) return nearest[i];
+    }
+    return std::nullopt;
 }
 
 }  // namespace
@@ -146,6 +154,10 @@ Outlines::Rays Outlines::sample(const core::RenderInputs& inputs, const SceneLig
             sample.steps = seen.steps[i];
             sample.direct = seen.emitted[i] + direct[i];
             if (!seen.surface(i)) continue;
+            sample.normal = seen.points[i].frame.normal;
+            sample.albedo = core::approximate_albedo(seen.points[i].brdf);
+            sample.depth = seen.depth[i];
+            sample.distance = seen.distance[i];
             const auto source = find_source(visible, sample.pixel, seen.points[i]);
             sample.source = source ? static_cast<std::uint32_t>(*source) : OutlineSample::kAlone;
             if (source) sample.tint = tint_between(visible.points[*source], seen.points[i]);

@@ -2,9 +2,10 @@
 //
 // A frame lights one sample a pixel with care, so that few frames leave outlines ragged. Pixels in which an
 // earlier frame found an outline take further camera rays. These have their own emission, sky and direct
-// light by one shadow ray; their indirect light is that of the nearest of the frame's samples beside them on
-// the same surface. Which pixels take them depends on earlier frames alone: a sample that chose its own
-// company would weigh itself wrongly.
+// light by one shadow ray; their indirect light is that of the nearest of the frame's samples beside them, on
+// the same surface if there is one: an approximation, which blurs indirect light by a pixel. All of them
+// count, and which pixels take them depends on earlier frames alone: a sample that chose its own company
+// would weigh itself wrongly.
 #pragma once
 
 #include <cstdint>
@@ -25,10 +26,15 @@ struct OutlineSample {
     std::uint32_t source = kSky;  ///< The pixel whose indirect light it takes, or one of:
     glm::vec3 tint{1.0f};         ///< Its albedo over the source's.
     glm::vec3 direct{0.0f};       ///< Emission or sky, and light of S.
+    glm::vec3 normal{0.0f};
+    glm::vec3 albedo{0.0f};
+    float depth = 0.0f;     ///< Planar.
+    float distance = 0.0f;  ///< Along the ray.
     std::uint32_t steps = 0;
 
-    static constexpr std::uint32_t kSky = 0xffffffffu;    ///< No surface.
-    static constexpr std::uint32_t kAlone = 0xfffffffeu;  ///< No sample is on its surface: it does not count.
+    static constexpr std::uint32_t kSky = 0xffffffffu;  ///< No surface.
+    static constexpr std::uint32_t kAlone =
+        0xfffffffeu;  ///< No sample about it is on any surface: no indirect light.
 };
 
 /// The samples of the film of all pixels over the frames of a picture.

@@ -127,11 +127,11 @@ void guess_light(const ProbeAtlas& last, const Probe& probe, float plane_sharpne
     }
     double sum = 0.0;
     for (const float value : light) sum += static_cast<double>(value);
-    if (!(sum > 0.0) || !std::isfinite(sum)) {
+    const auto scale = static_cast<float>(static_cast<double>(light.size()) / sum);
+    if (!(sum > 0.0) || !std::isfinite(sum) || !std::isfinite(scale)) {
         light.clear();
         return;
     }
-    const auto scale = static_cast<float>(static_cast<double>(light.size()) / sum);
     for (float& value : light) value *= scale;
 }
 

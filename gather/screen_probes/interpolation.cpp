@@ -1,7 +1,9 @@
 #include "gather/screen_probes/interpolation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 namespace gather {
 
@@ -12,6 +14,9 @@ constexpr float kLeastCorner = 1e-3f;
 
 /// Below this no probe lies on the point's surface.
 constexpr float kLeastSupport = 1e-3f;
+
+/// Of a length to divide by.
+constexpr float kLeastSpacing = std::numeric_limits<float>::min();
 
 /// Halvings by the plane distance beyond which a weight is 0.
 constexpr float kGone = 40.0f;
@@ -67,10 +72,10 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
                           static_cast<int>(reader.pixel.y) / atlas.spacing);
     const auto own = static_cast<std::size_t>(tile.y * atlas.tiles_x + tile.x);
     const float to_relative = 1.0f / reader.depth;
-    const float to_spacings2 = 1.0f / (reader.spacing * reader.spacing);
+    std::array<float, ProbeWeights::kMost> on_surface_of{};
     atlas.for_probes_around(glm::ivec2(reader.pixel), [&](std::size_t index) {
         const Probe& probe = atlas.probes[index];
-        if (!probe.valid() || result.count == ProbeWeights::kMost) return;
+        if (!probe.valid()) return;
         const float corner = std::max(index == own ? kLeastCorner : 0.0f,
                                       tent(glm::vec2(probe.pixel) - reader.pixel, spacing));
         if (!(corner > 0.0f)) return;
@@ -79,10 +84,23 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
         const float distance = plane_distance(offset, reader.normal, probe.normal) * to_relative;
         if (!(facing > 0.0f) || sharpness * distance * distance > kGone) return;
         const float on_surface = corner * facing * weight_at(distance, sharpness);
-        const float spacings2 = glm::dot(offset, offset) * to_spacings2;
+        // A ratio first: the squares of very small lengths are 0.
+        const float spacings = glm::length(offset) / std::max(reader.spacing, kLeastSpacing);
+        const float spacings2 = spacings * spacings;
         const float weight = on_surface / (1.0f + spacings2 * spacings2);
-        result.probe[result.count] = static_cast<std::uint32_t>(index);
-        result.weight[result.count++] = weight;
+        std::size_t at = result.count;
+        if (at < ProbeWeights::kMost) {
+            ++result.count;
+        } else {
+            // Where probes crowd, those that matter most.
+            at = static_cast<std::size_t>(std::ranges::min_element(result.weight) - result.weight.begin());
+            if (!(weight > result.weight[at])) return;
+            result.support -= result.weight[at];
+            result.surface_support -= on_surface_of[at];
+        }
+        result.probe[at] = static_cast<std::uint32_t>(index);
+        result.weight[at] = weight;
+        on_surface_of[at] = on_surface;
         result.support += weight;
         result.surface_support += on_surface;
     });

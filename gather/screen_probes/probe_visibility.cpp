@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 
+#include "core/math/random.h"
 #include "core/support/parallel.h"
 
 namespace gather {
@@ -15,7 +17,7 @@ constexpr std::size_t kPixelsAtOnce = 1024;
 /// degrees, the most that interpolation allows, runs an eighth of it below.
 constexpr float kLift = 0.15f;
 
-/// Of a weight, for a ray: less is hardly seen.
+/// Of a weight, for a ray: less is hardly seen, and says nothing of its own.
 constexpr float kLeastWeight = 0.02f;
 
 /// Nothing stands near a pixel that is at least this open.
@@ -26,11 +28,17 @@ struct Question {
     std::size_t entry;  ///< Of the pixel's weights.
 };
 
+/// Between points that lie at least as far above their surfaces as rays from there start.
 /// @return false where both are one point
-bool ray_between(const glm::vec3& a, const glm::vec3& a_normal, const Probe& b, core::Ray& ray) {
-    const float lift = kLift * glm::length(b.position - a);
-    const glm::vec3 origin = a + lift * a_normal;
-    const glm::vec3 offset = b.position + lift * b.normal - origin;
+bool ray_between(const VisibleSurfaces& visible, std::size_t pixel, const Probe& probe, core::Ray& ray) {
+    const auto start_offset = [&](std::size_t i) {
+        return glm::length(visible.origins[i] - visible.points[i].position);
+    };
+    const core::SurfacePoint& point = visible.points[pixel];
+    const float lift = kLift * glm::length(probe.position - point.position);
+    const float probe_lift = std::max(lift, start_offset(visible.index(probe.pixel.x, probe.pixel.y)));
+    const glm::vec3 origin = point.position + std::max(lift, start_offset(pixel)) * point.geometric_normal;
+    const glm::vec3 offset = probe.position + probe_lift * probe.normal - origin;
     const float distance = glm::length(offset);
     if (!(distance > 0.0f)) return false;
     ray.origin = origin;
@@ -39,11 +47,16 @@ bool ray_between(const glm::vec3& a, const glm::vec3& a_normal, const Probe& b, 
     return true;
 }
 
+/// @pre those that are hidden have negative weights
 void keep_visible(ProbeWeights& weights) {
     float sum = 0.0f;
-    for (std::size_t i = 0; i < weights.count; ++i) sum += std::max(weights.weight[i], 0.0f);
-    if (!(sum > 0.0f)) {
-        for (std::size_t i = 0; i < weights.count; ++i) weights.weight[i] = -weights.weight[i];
+    bool any_seen = false;
+    for (std::size_t i = 0; i < weights.count; ++i) {
+        sum += std::max(weights.weight[i], 0.0f);
+        any_seen = any_seen || weights.weight[i] >= kLeastWeight;
+    }
+    if (!any_seen) {
+        for (std::size_t i = 0; i < weights.count; ++i) weights.weight[i] = std::abs(weights.weight[i]);
         weights.confident = false;
         return;
     }
@@ -55,9 +68,10 @@ void keep_visible(ProbeWeights& weights) {
 }  // namespace
 
 PassRays hide_probes(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
-                     const ProbeAtlas& atlas, std::span<const float> openness,
+                     const ProbeAtlas& atlas, std::span<const float> openness, std::uint32_t frame,
                      std::vector<ProbeWeights>& weights) {
     std::atomic<std::uint64_t> ray_count{0};
+    const auto width = static_cast<std::size_t>(visible.width);
     core::parallel_for(weights.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
         const core::ScopedFlushDenormals flush;
         std::vector<Question> questions;
@@ -65,16 +79,17 @@ PassRays hide_probes(const core::RenderInputs& inputs, const VisibleSurfaces& vi
         for (std::size_t pixel = begin; pixel < end; ++pixel) {
             if (!visible.surface(pixel) || !weights[pixel].confident) continue;
             if (!openness.empty() && openness[pixel] >= kOpen) continue;
-            const core::SurfacePoint& point = visible.points[pixel];
+            const std::uint32_t key =
+                core::hash_words(pixel_key(inputs.seed, static_cast<int>(pixel % width),
+                                           static_cast<int>(pixel / width), kVisibilityUse),
+                                 frame);
             for (std::size_t i = 0; i < weights[pixel].count; ++i) {
                 core::Ray ray;
                 if (weights[pixel].weight[i] < kLeastWeight ||
-                    !ray_between(point.position, point.geometric_normal,
-                                 atlas.probes[weights[pixel].probe[i]], ray)) {
+                    !ray_between(visible, pixel, atlas.probes[weights[pixel].probe[i]], ray)) {
                     continue;
                 }
-                ray.seed =
-                    pixel_key(inputs.seed, static_cast<int>(pixel), static_cast<int>(i), kVisibilityUse);
+                ray.seed = core::hash_words(key, static_cast<std::uint32_t>(i));
                 asked.push_back(ray);
                 questions.push_back({pixel, i});
             }

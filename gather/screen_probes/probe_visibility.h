@@ -17,9 +17,9 @@ namespace gather {
 /// Takes probes that are hidden from their pixel out of its weights. A pixel that all are hidden from keeps
 /// them, and is not confident.
 /// @param openness mean visibility of each pixel's surroundings: where all is open no ray is traced; empty:
-/// not known, all pixels trace
+/// not known, all pixels trace. @param frame decides, with the pixel, what blended surfaces let through
 PassRays hide_probes(const core::RenderInputs& inputs, const VisibleSurfaces& visible,
-                     const ProbeAtlas& atlas, std::span<const float> openness,
+                     const ProbeAtlas& atlas, std::span<const float> openness, std::uint32_t frame,
                      std::vector<ProbeWeights>& weights);
 
 }  // namespace gather

@@ -268,13 +268,12 @@ ProbeTraceCost trace_probes(const ProbeTraceInputs& in, ProbeAtlas& atlas) {
             }
         }
     });
-    double all = 0.0;
-    double gone = 0.0;
+    ProbeTraceCost cost{ray_count, shadow_count, exhausted};
     for (std::size_t b = 0; b < batches; ++b) {
-        all += brought[b];
-        gone += removed[b];
+        cost.light += brought[b];
+        cost.clamped += removed[b];
     }
-    return {ray_count, shadow_count, exhausted, all > 0.0 ? gone / all : 0.0};
+    return cost;
 }
 
 }  // namespace gather

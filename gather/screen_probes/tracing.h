@@ -29,7 +29,8 @@ struct ProbeTraceCost {
     std::uint64_t probe_rays = 0;
     std::uint64_t shadow_rays = 0;
     std::uint64_t exhausted = 0;
-    double clamped_share = 0.0;  ///< Luminance that max_ray_intensity removed, of all that rays brought.
+    double light = 0.0;    ///< Sum of what the rays brought, in luminance,
+    double clamped = 0.0;  ///< and of what max_ray_intensity took off it.
 };
 
 /// Fills the texels of all valid probes: radiance is the mean of a texel's rays, the distance their minimum.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "gather/effect_costs.h"
 #include "tests/support/analytic_scenes.h"
@@ -107,6 +108,24 @@ TEST(Effects, EmissiveSamplingLeavesTheSkyAlone) {
                             render(scene, settings, "sky,screen_probes").frame.image);
 }
 
+/// Those that nothing else would run.
+std::vector<std::string> passes_of_its_own(Effect effect) {
+    switch (effect) {
+        case Effect::kScreenProbes:
+            return {"place_probes", "trace_probes", "probe_shadows", "integrate", "probe_visibility"};
+        case Effect::kSpatialFilter:
+            return {"filter_probes"};
+        case Effect::kReflections:
+            return {"reflections", "reflection_shadows", "reflection_reuse"};
+        case Effect::kBentNormal:
+            return {"near_field", "bent_normal", "bent_normal_shadows"};
+        case Effect::kTemporal:
+            return {"outlines", "outline_shadows"};
+        default:
+            return {};
+    }
+}
+
 TEST(Effects, WhatIsOffCostsNothingAndWhatIsOnSomething) {
     gather::Settings settings;
     settings.frames = 2;
@@ -131,7 +150,11 @@ TEST(Effects, WhatIsOffCostsNothingAndWhatIsOnSomething) {
         core::Scene without = scene;
         gather::apply_plan(gather::make_plan(scene, kWidth, kHeight, settings, gather::parse_effects(others)),
                            without);
-        const gather::EffectCost off = render(without, settings, others.c_str()).cost(effect, settings);
+        const Picture dropped = render(without, settings, others.c_str());
+        for (const core::PassCost& pass : dropped.frame.passes) {
+            EXPECT_EQ(std::ranges::count(passes_of_its_own(effect), pass.name), 0) << pass.name;
+        }
+        const gather::EffectCost off = dropped.cost(effect, settings);
         EXPECT_TRUE(off.passes.empty());
         EXPECT_EQ(off.seconds, 0.0);
         EXPECT_EQ(off.rays, 0u);

@@ -26,10 +26,11 @@ protected:
         : scene_(tests::scene_of(tests::box({0.01f, 0.2f, 1.0f}), tests::translation({0.15, 0, 0}))),
           tracer_(scene_),
           atlas_(tests::constant_atlas(4, {0.1f, 0, 0}, {0, 0, 0.1f}, kUp)) {
-        visible_.resize(1, 1);
+        visible_.resize(48, 48);
         visible_.depth[0] = 2.0f;
         core::SurfacePoint& point = visible_.points[0];
-        point.position = {0.1f, 0, 0.1f};  // As the probe in the middle; the wall stands before column 2.
+        point.position = visible_.origins[0] = {
+            0.1f, 0, 0.1f};  // As the probe in the middle; the wall stands before column 2.
         point.geometric_normal = kUp;
         weights_.resize(1);
         weights_[0].count = 3;
@@ -39,7 +40,7 @@ protected:
 
     std::uint64_t hide(std::span<const float> openness) {
         const core::Camera camera;
-        return gather::hide_probes(tests::pass_inputs(scene_, tracer_, camera), visible_, atlas_, openness,
+        return gather::hide_probes(tests::pass_inputs(scene_, tracer_, camera), visible_, atlas_, openness, 0,
                                    weights_)
             .rays;
     }
@@ -65,6 +66,17 @@ TEST_F(ProbeVisibility, WhereAllAreHiddenTheyStayAndThePixelIsNotConfident) {
     weights_[0].weight = {1.0f};
     hide({});
     EXPECT_EQ(weights_[0].weight[0], 1.0f);
+    EXPECT_FALSE(weights_[0].confident);
+}
+
+/// What weighs too little to be asked does not stand in for what is hidden.
+TEST_F(ProbeVisibility, ACrumbThatIsNotAskedIsNotSeen) {
+    weights_[0].count = 2;
+    weights_[0].probe = {5, 3};
+    weights_[0].weight = {0.99f, 0.01f};
+    EXPECT_EQ(hide({}), 1u);
+    EXPECT_EQ(weights_[0].weight[0], 0.99f);
+    EXPECT_EQ(weights_[0].weight[1], 0.01f);
     EXPECT_FALSE(weights_[0].confident);
 }
 
@@ -226,6 +238,30 @@ TEST(Outlines, FurtherSamplesOfTheFilmSmoothThemAndMoveNothing) {
     const double one = errors(1);
     EXPECT_GT(one, 0.0);
     EXPECT_LT(errors(4), 0.3 * one);
+}
+
+/// A bar a quarter of a pixel wide, of its own instance: most samples that meet it have none beside them on
+/// it.
+TEST(Outlines, WhatIsThinnerThanAPixelKeepsItsLight) {
+    const core::Camera camera = tests::camera_of(tests::furnace(0.0f));
+    core::Scene scene;
+    core::Material material = tests::lambert(glm::vec3(0.5f));
+    material.emission = glm::vec3(1.0f);
+    const std::uint32_t emissive = tests::add_material(scene, material);
+    tests::add_instance(scene, tests::add_mesh(scene, tests::box({0.006f, 0.6f, 0.006f})),
+                        tests::translation({0.013, 0, 0}), emissive);
+    const core::Frame truth =
+        tests::render(scene, camera, {.width = 64, .height = 48, .samples_per_pixel = 4096, .bounces = 0});
+    gather::Settings settings = few_frames();
+    settings.bounces = 0;
+    settings.film.outline_samples = 4;
+    double mean = 0.0;
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        mean += tests::mean_radiance(
+                    tests::gather_picture(scene, camera, settings, "auto", {.seed = seed}).frame.image) /
+                8.0;
+    }
+    EXPECT_NEAR(mean / tests::mean_radiance(truth.image), 1.0, 0.03);
 }
 
 /// Pixels that no outline crosses take the same samples whether others take more or not.

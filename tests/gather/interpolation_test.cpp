@@ -56,6 +56,42 @@ double sampled_albedo(const core::Brdf& metal, const glm::vec3& outgoing) {
     return albedo;
 }
 
+/// More probes than a pixel reads, the one beside it the last of them.
+TEST(ProbeInterpolation, WhereProbesCrowdThoseThatMatterAreRead) {
+    gather::ProbeAtlas atlas = tests::constant_atlas(4, {0.1f, 0, 0}, {0, 0, 0.1f}, kUp);
+    const glm::ivec2 at(24, 24);
+    gather::Probe crumb = atlas.probes[4];
+    for (int i = 0; i < 20; ++i) {
+        crumb.pixel = {at.x - 15, at.y - 15 + i % 2};
+        atlas.probes.push_back(crumb);
+    }
+    gather::Probe own = atlas.probes[4];
+    own.pixel = at;
+    atlas.probes.push_back(own);
+    atlas.adaptive_begin = {9, 29, 29, 29, 29, 30, 30, 30, 30, 30};
+    const gather::ProbeWeights weights =
+        gather::find_probes(atlas, {glm::vec2(at), own.position, kUp, 2.0f, 0.1f}, 1e5f);
+    EXPECT_EQ(weights.count, gather::ProbeWeights::kMost);
+    float own_weight = 0.0f, sum = 0.0f;
+    for (std::size_t i = 0; i < weights.count; ++i) {
+        sum += weights.weight[i];
+        if (weights.probe[i] == 29) own_weight = weights.weight[i];
+    }
+    EXPECT_NEAR(sum, 1.0f, 1e-5f);
+    EXPECT_GT(own_weight, 0.5f);
+}
+
+TEST(ProbeInterpolation, LengthsWhoseSquaresVanishLeaveFiniteWeights) {
+    const gather::ProbeAtlas atlas = tests::constant_atlas(4, {0.1f, 0, 0}, {0, 0, 0.1f}, kUp);
+    for (const float spacing : {0.0f, 1e-30f}) {
+        const gather::ProbeWeights weights = gather::find_probes(
+            atlas, {glm::vec2(21, 25), atlas.probes[4].position, kUp, 2.0f, spacing}, 1e5f);
+        float sum = 0.0f;
+        for (std::size_t i = 0; i < weights.count; ++i) sum += weights.weight[i];
+        EXPECT_NEAR(sum, 1.0f, 1e-6f) << spacing;
+    }
+}
+
 TEST(ProbeInterpolation, OnAGrazingSurfaceNearerProbesCountMore) {
     const gather::ProbeAtlas atlas = grazing_atlas();
     // Half-way on the screen between the rows; in the world much nearer to the first.

@@ -144,9 +144,15 @@ TEST_F(NearLightSharing, IsAMeanByATentOverThePlane) {
     EXPECT_FLOAT_EQ(light_[1].compared_share, 0.75f);
     EXPECT_FLOAT_EQ(light_[1].open_share, 0.25f);
     EXPECT_FLOAT_EQ(history_.agreement[0].probe_share(), 0.5f);
-    EXPECT_EQ(light_[2].open_share, 1.0f);
-    EXPECT_EQ(light_[2].found.irradiance.x, 0.0f);
+    // And takes its share of what its neighbour found, so that none is lost.
+    EXPECT_FLOAT_EQ(light_[2].found.irradiance.x, 4.0f / 4.0f);
+    EXPECT_FLOAT_EQ(light_[2].compared_share, 0.25f);
+    EXPECT_FLOAT_EQ(light_[2].open_share, 0.75f);
+    EXPECT_EQ(light_[3].open_share, 1.0f);
+    EXPECT_EQ(light_[3].found.irradiance.x, 0.0f);
     EXPECT_EQ(history_.agreement[3].held, 0.0f);
+    // Its own rays have found nothing yet: it does not pass on what it was lent.
+    EXPECT_EQ(history_.compared, (std::vector<std::uint8_t>{1, 1, 0, 0}));
 }
 
 TEST_F(NearLightSharing, KeepsToItselfOffThePlaneAndWhereTheRadiusIsZero) {
@@ -158,6 +164,37 @@ TEST_F(NearLightSharing, KeepsToItselfOffThePlaneAndWhereTheRadiusIsZero) {
     share(0);
     EXPECT_FLOAT_EQ(light_[0].found.irradiance.x, 1.0f);
     EXPECT_FLOAT_EQ(light_[1].found.irradiance.x, 4.0f);
+}
+
+/// One pixel of a plane finds something; all have as many neighbours as it.
+TEST_F(NearLightSharing, LosesNothingAmongOpenPixels) {
+    for (const int radius : {1, 2, 8}) {
+        const int edge = 4 * radius + 1;
+        const auto pixels = static_cast<std::size_t>(edge * edge);
+        visible_.resize(edge, edge);
+        for (std::size_t i = 0; i < pixels; ++i) {
+            visible_.depth[i] = 2.0f;
+            visible_.points[i].geometric_normal = kUp;
+            visible_.points[i].frame = core::ShadingFrame::from_normal(kUp);
+        }
+        light_.assign(pixels, {});
+        bent_.assign(pixels, {});
+        history_ = {};
+        gather::NearLight& middle = light_[visible_.index(2 * radius, 2 * radius)];
+        middle.kind = gather::NearLight::Kind::kCompared;
+        middle.found.irradiance = glm::vec3(3.0f);
+        middle.held.irradiance = glm::vec3(5.0f);
+        share(radius);
+        float found = 0.0f, held = 0.0f, compared = 0.0f;
+        for (const gather::NearLight& light : light_) {
+            found += light.found.irradiance.x;
+            held += light.held.irradiance.x;
+            compared += light.compared_share;
+        }
+        EXPECT_NEAR(found, 3.0f, 1e-4f) << radius;
+        EXPECT_NEAR(held, 5.0f, 1e-4f) << radius;
+        EXPECT_NEAR(compared, 1.0f, 1e-4f) << radius;
+    }
 }
 
 TEST_F(NearLightSharing, LobesThatReflectWhatIsNearShareItAmongTheirLike) {

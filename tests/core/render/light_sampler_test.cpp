@@ -189,6 +189,32 @@ TEST(LightSampler, NeverSamplesWhatASubsetLeavesOut) {
     EXPECT_EQ(skyless.escaped_radiance({0, -1, 0}), glm::vec3(0.0f));
 }
 
+/// A rectangle whose emission texture is black but for `bright` texels of 64 x 64, between what is probed.
+core::Scene lit_window(std::size_t bright) {
+    core::Scene scene;
+    core::TextureImage image;
+    image.width = image.height = 64;
+    image.rgba.assign(4 * 64 * 64, 0);
+    for (std::size_t i = 0; i < bright; ++i) image.rgba[4 * (64 * 63 + i) + 1] = 255;
+    scene.images.push_back(image);
+    scene.textures.emplace_back();
+    core::Material material = tests::lambert(glm::vec3(0.5f));
+    material.emission = glm::vec3(3.0f);
+    material.emission_texture.texture = 0;
+    const std::uint32_t mesh = tests::add_mesh(scene, tests::quad(1.0f, 1.0f, 1, 1));
+    tests::add_instance(scene, mesh, tests::translation({0, 0, 0}), tests::add_material(scene, material));
+    return scene;
+}
+
+TEST(LightSampler, SamplesTexturesThatAreBrightBetweenTheProbes) {
+    const core::Scene dark = lit_window(0);
+    EXPECT_TRUE(core::LightSampler(dark).empty());
+    const core::Scene lit = lit_window(1);
+    const core::LightSampler sampler(lit);
+    EXPECT_EQ(sampler.group_count(), 1u);
+    for (std::uint32_t t = 0; t < 2; ++t) EXPECT_TRUE(sampler.emits(0, t)) << t;
+}
+
 TEST(LightSampler, IsEmptyInADarkScene) {
     const core::Scene scene = tests::scene_of(tests::box());
     EXPECT_TRUE(core::LightSampler(scene).empty());
