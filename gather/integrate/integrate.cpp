@@ -126,7 +126,7 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
             const glm::ivec2 at(pixel % width, pixel / width);
             const core::SurfacePoint& point = visible.points[pixel];
             ProbeReader reader{
-                glm::vec2(at), point.position, point.geometric_normal, visible.depth[pixel],
+                glm::vec2(at), point.position, point.geometric_normal, visible.plane_scale(pixel),
                 visible.footprint.at(visible.depth[pixel]) * static_cast<float>(in.atlas.spacing)};
             if (in.probes.jitter_interpolation && in.atlas.spacing > 1) {
                 const core::SampleSequence sequence(pixel_key(in.seed, at.x, at.y, kInterpolationUse),
@@ -137,7 +137,7 @@ void interpolate_probes(const IntegrateInputs& in, std::vector<ProbeWeights>& we
                                                     glm::ivec2(visible.width, visible.height) - 1);
                 const std::size_t there = visible.index(moved.x, moved.y);
                 if (visible.surface(there) &&
-                    is_same_plane(point, visible.depth[pixel], visible.points[there],
+                    is_same_plane(point, visible.plane_scale(pixel), visible.points[there],
                                   in.probes.plane_sharpness)) {
                     reader.pixel = glm::vec2(moved);
                 }

@@ -69,7 +69,7 @@ private:
         const core::SurfacePoint& other = visible_.points[there];
         return glm::dot(point.frame.normal, other.frame.normal) >= kLeastNormalCosine &&
                (!reflects_near_light(point) || is_same_lobe(point.brdf, other.brdf)) &&
-               is_same_plane(point, visible_.depth[pixel], other, plane_sharpness_);
+               is_same_plane(point, visible_.plane_scale(pixel), other, plane_sharpness_);
     }
 
     static bool is_same_lobe(const core::Brdf& one, const core::Brdf& other) {

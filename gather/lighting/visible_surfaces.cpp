@@ -20,6 +20,7 @@ PixelFootprint::PixelFootprint(const core::CameraRays& camera, int width, int he
     const core::Ray beside = camera.ray(center + glm::vec2(1.0f, 0.0f));
     origin_ = beside.origin - here.origin;
     direction_ = beside.direction - here.direction;
+    height_ = static_cast<float>(height);
 }
 
 void VisibleSurfaces::resize(int new_width, int new_height) {

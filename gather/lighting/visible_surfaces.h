@@ -1,9 +1,11 @@
 // gather/lighting/visible_surfaces.h: what each pixel sees in one frame, and its direct light.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -14,7 +16,7 @@
 
 namespace gather {
 
-/// How large a pixel in the middle of the picture is at some depth.
+/// How large a pixel in the middle of the picture, and the picture, are at some depth.
 class PixelFootprint {
 public:
     PixelFootprint() = default;
@@ -23,8 +25,13 @@ public:
     /// In world units. @param depth planar
     float at(float depth) const { return glm::length(origin_ + depth * direction_); }
 
+    /// The length that distances from planes are told by: the depth, as long as the picture is not narrower
+    /// than half of it. Through long lenses, and without perspective, depth says nothing of what is seen.
+    float plane_scale(float depth) const { return std::min(depth, 2.0f * height_ * at(depth)); }
+
 private:
     glm::vec3 origin_{0.0f}, direction_{0.0f};  ///< From the ray of one pixel to its neighbour's.
+    float height_ = std::numeric_limits<float>::infinity();  ///< Of the picture, in pixels.
 };
 
 /// One camera ray a pixel; row-major. Pixels without a surface have depth 0.
@@ -41,6 +48,7 @@ struct VisibleSurfaces {
     std::vector<std::uint32_t> steps;
 
     bool surface(std::size_t pixel) const { return depth[pixel] > 0.0f; }
+    float plane_scale(std::size_t pixel) const { return footprint.plane_scale(depth[pixel]); }
     std::size_t index(int x, int y) const {
         return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
     }

@@ -48,8 +48,8 @@ void filter_probes(const ScreenProbeSettings& settings, const TexelTable& table,
                         const Probe& other = atlas.probes[n];
                         if (n == p || !other.valid()) continue;
                         const float plane =
-                            surface_weight(own.position, own.normal, own.depth, other.position, other.normal,
-                                           settings.plane_sharpness);
+                            surface_weight(own.position, own.normal, own.plane_scale, other.position,
+                                           other.normal, settings.plane_sharpness);
                         if (!(plane > kLeastPlaneWeight)) continue;
                         const glm::vec3 offset = other.position - own.position;
                         for (std::size_t t = 0; t < texels; ++t) {

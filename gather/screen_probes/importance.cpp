@@ -88,8 +88,9 @@ core::Sh accumulate_brdf(const VisibleSurfaces& visible, const Probe& probe, int
         const std::size_t pixel = visible.index(x, y);
         if (!visible.surface(pixel)) return;
         const core::SurfacePoint& point = visible.points[pixel];
-        const float weight = surface_weight(point.position, point.geometric_normal, visible.depth[pixel],
-                                            probe.position, probe.normal, plane_sharpness);
+        const float weight =
+            surface_weight(point.position, point.geometric_normal, visible.plane_scale(pixel), probe.position,
+                           probe.normal, plane_sharpness);
         if (!(weight > 0.01f)) return;
         total += weight;
         add(point.frame.normal, weight);
@@ -116,7 +117,7 @@ void guess_light(const ProbeAtlas& last, const Probe& probe, float plane_sharpne
                  std::vector<float>& light) {
     light.clear();
     const ProbeWeights weights = find_probes(
-        last, {glm::vec2(probe.pixel), probe.position, probe.normal, probe.depth}, plane_sharpness);
+        last, {glm::vec2(probe.pixel), probe.position, probe.normal, probe.plane_scale}, plane_sharpness);
     if (!weights.confident || weights.count == 0) return;
     light.assign(last.texel_count(), 0.0f);
     for (std::size_t i = 0; i < weights.count; ++i) {

@@ -50,18 +50,18 @@ float tent(const glm::vec2& offset, float radius) {
 
 }  // namespace
 
-float surface_weight(const glm::vec3& position, const glm::vec3& normal, float depth, const glm::vec3& other,
-                     const glm::vec3& other_normal, float sharpness) {
+float surface_weight(const glm::vec3& position, const glm::vec3& normal, float plane_scale,
+                     const glm::vec3& other, const glm::vec3& other_normal, float sharpness) {
     const glm::vec3 offset = other - position;
-    return weight_at(plane_distance(offset, normal, other_normal) / depth, sharpness) *
+    return weight_at(plane_distance(offset, normal, other_normal) / plane_scale, sharpness) *
            normal_weight(offset, normal, other_normal);
 }
 
-bool is_same_plane(const core::SurfacePoint& point, float depth, const core::SurfacePoint& other,
+bool is_same_plane(const core::SurfacePoint& point, float plane_scale, const core::SurfacePoint& other,
                    float sharpness) {
     constexpr float kSamePlane = 0.5f;
     if (other.triangle == point.triangle && other.instance == point.instance) return true;
-    return surface_weight(point.position, point.geometric_normal, depth, other.position,
+    return surface_weight(point.position, point.geometric_normal, plane_scale, other.position,
                           other.geometric_normal, sharpness) > kSamePlane;
 }
 
@@ -71,7 +71,7 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
     const glm::ivec2 tile(static_cast<int>(reader.pixel.x) / atlas.spacing,
                           static_cast<int>(reader.pixel.y) / atlas.spacing);
     const auto own = static_cast<std::size_t>(tile.y * atlas.tiles_x + tile.x);
-    const float to_relative = 1.0f / reader.depth;
+    const float to_relative = 1.0f / reader.plane_scale;
     std::array<float, ProbeWeights::kMost> on_surface_of{};
     atlas.for_probes_around(glm::ivec2(reader.pixel), [&](std::size_t index) {
         const Probe& probe = atlas.probes[index];
@@ -116,8 +116,9 @@ ProbeWeights find_probes(const ProbeAtlas& atlas, const ProbeReader& reader, flo
         if (!probe.valid()) return;
         const glm::vec3 offset = probe.position - reader.position;
         // One that faces elsewhere stands in only where there is no other.
-        const float badness = plane_distance(offset, reader.normal, probe.normal) +
-                              (1.0f - normal_weight(offset, reader.normal, probe.normal)) * reader.depth;
+        const float badness =
+            plane_distance(offset, reader.normal, probe.normal) +
+            (1.0f - normal_weight(offset, reader.normal, probe.normal)) * reader.plane_scale;
         if (!(badness < least_badness)) return;
         least_badness = badness;
         result.probe[0] = static_cast<std::uint32_t>(index);

@@ -41,7 +41,7 @@ void take_out_near_field(const ScreenProbeSettings& settings, const VisibleSurfa
             atlas.for_probes_around(own.pixel, [&](std::size_t n) {
                 const Probe& other = atlas.probes[n];
                 if (n == p || !other.valid()) return;
-                const float weight = surface_weight(own.position, own.normal, own.depth, other.position,
+                const float weight = surface_weight(own.position, own.normal, own.plane_scale, other.position,
                                                     other.normal, settings.plane_sharpness);
                 if (weight > kLeastWeight) beside.emplace_back(n, weight);
             });

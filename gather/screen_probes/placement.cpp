@@ -20,7 +20,8 @@ constexpr int kRefinementLevels = 2;
 Probe probe_at(const VisibleSurfaces& visible, int x, int y, int level) {
     const std::size_t pixel = visible.index(x, y);
     const core::SurfacePoint& point = visible.points[pixel];
-    return {{x, y}, point.position, point.geometric_normal, visible.depth[pixel], level};
+    return {{x, y}, point.position, point.geometric_normal, visible.depth[pixel], visible.plane_scale(pixel),
+            level};
 }
 
 /// One frame's placement.
@@ -89,7 +90,7 @@ bool Placement::fails(int x, int y) const {
     const core::SurfacePoint& point = visible_.points[pixel];
     const ProbeWeights weights =
         find_probes(atlas_,
-                    {glm::vec2(x, y), point.position, point.geometric_normal, visible_.depth[pixel],
+                    {glm::vec2(x, y), point.position, point.geometric_normal, visible_.plane_scale(pixel),
                      visible_.footprint.at(visible_.depth[pixel]) * static_cast<float>(atlas_.spacing)},
                     settings_.plane_sharpness);
     const float support = by_distance_ ? weights.support : weights.surface_support;

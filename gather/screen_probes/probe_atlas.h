@@ -20,6 +20,7 @@ struct Probe {
     glm::vec3 position{0.0f};
     glm::vec3 normal{0.0f, 0.0f, 1.0f};  ///< Geometric.
     float depth = 0.0f;                  ///< Planar; 0: no surface in its tile, and no light.
+    float plane_scale = 1.0f;            ///< Of its pixel.
     int level = 0;                       ///< 0 uniform, 1, 2 by refinement, 3 by flood fill.
 
     bool valid() const { return depth > 0.0f; }

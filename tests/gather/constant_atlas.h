@@ -20,7 +20,7 @@ inline gather::ProbeAtlas constant_atlas(int resolution, const glm::vec3& across
             probe.pixel = {16 * x + 5, 16 * y + 9};
             probe.position = static_cast<float>(x) * across + static_cast<float>(y) * along;
             probe.normal = normal;
-            probe.depth = 2.0f;
+            probe.depth = probe.plane_scale = 2.0f;
             atlas.probes.push_back(probe);
         }
     }

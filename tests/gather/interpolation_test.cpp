@@ -32,6 +32,21 @@ TEST(SurfaceWeight, AFloorSharesWithSlopesButNotWithTheWallBesideIt) {
     EXPECT_GT(gather::surface_weight({1e-4f, 0, 0}, kUp, 1.0f, {0, 1e-4f, 0}, slope, 1e5f), 0.9f);
 }
 
+/// Whoever zooms in, or looks without perspective from afar, sees the same edges as who comes near.
+TEST(SurfaceWeight, DepthSaysNothingThroughALongLens) {
+    core::Camera camera;
+    const auto scale_at = [&](float depth) {
+        return gather::PixelFootprint(core::CameraRays(camera, 640, 360), 640, 360).plane_scale(depth);
+    };
+    camera.vertical_fov = 0.9;
+    EXPECT_EQ(scale_at(3.0f), 3.0f);
+    camera.vertical_fov = 0.01;  // The picture is 1 unit high 100 away.
+    EXPECT_NEAR(scale_at(100.0f), 2.0f, 0.01f);
+    camera.orthographic = true;
+    camera.magnification = {0.5, 0.5};
+    for (const float depth : {10.0f, 1e3f, 1e6f}) EXPECT_NEAR(scale_at(depth), 2.0f, 0.01f) << depth;
+}
+
 TEST(SurfaceWeight, PlanesAreAskedFromBothSides) {
     // The second point lies in the first one's plane, but not the first in the second's.
     const glm::vec3 slope = glm::normalize(glm::vec3(0.3f, 1.0f, 0.0f));
