@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <iostream>
+#include <vector>
 
 #include "core/support/error.h"
 
@@ -10,36 +12,71 @@ namespace cli {
 
 namespace {
 
-void list_settings() {
-    for (const auto& setting : gather::describe_settings(gather::Settings{})) {
-        std::cout << fmt::format("{} = {}  ({})\n    {}\n", setting.name, setting.value, setting.values,
-                                 setting.meaning);
+constexpr std::array kQualities = {"draft", "medium", "high", "ultra"};
+
+/// Each with its value at `quality`, and what the others set it to where they differ.
+void list_settings(const std::string& quality) {
+    std::array<std::vector<gather::SettingDescription>, kQualities.size()> rows;
+    std::string frames;
+    for (std::size_t q = 0; q < kQualities.size(); ++q) {
+        const gather::Settings settings = gather::quality_settings(kQualities[q]);
+        rows[q] = gather::describe_settings(settings);
+        frames += fmt::format("{}{} {}", q == 0 ? "" : ", ", kQualities[q], settings.frames);
+    }
+    std::cout << fmt::format("--accumulate = {}  (1 ... {})\n    frames that are averaged\n    {}\n",
+                             gather::quality_settings(quality).frames, kMostFrames, frames);
+    const auto settings = gather::describe_settings(gather::quality_settings(quality));
+    for (std::size_t i = 0; i < settings.size(); ++i) {
+        std::string values;
+        bool differ = false;
+        for (std::size_t q = 0; q < kQualities.size(); ++q) {
+            differ = differ || rows[q][i].value != rows[0][i].value;
+            values += fmt::format("{}{} {}", q == 0 ? "" : ", ", kQualities[q], rows[q][i].value);
+        }
+        std::cout << fmt::format("{} = {}  ({})\n    {}\n", settings[i].name, settings[i].value,
+                                 settings[i].values, settings[i].meaning);
+        if (differ) std::cout << "    " << values << "\n";
     }
     throw CLI::Success();
+}
+
+std::string effect_names() {
+    std::string names;
+    for (std::size_t i = 0; i < gather::kEffectCount; ++i) {
+        names += (names.empty() ? "" : ",") + std::string(gather::name_of(static_cast<gather::Effect>(i)));
+    }
+    return names;
 }
 
 }  // namespace
 
 void GatherFlags::add_to(CLI::App& verb) {
-    own_ = {verb.add_option("--quality", quality_, "Of the gather: a row of settings")
-                ->check(CLI::IsMember({"draft", "medium", "high", "ultra"}).description(""))
-                ->capture_default_str(),
-            verb.add_option("--set", settings_,
-                            "Of the gather: NAME=VALUE of one setting, as often as wanted; --help-settings "
-                            "lists them")
-                ->allow_extra_args(false),
-            verb.add_option("--accumulate", frames_,
-                            "Of the gather: frames that it averages; by default the quality's, 16 at medium")
-                ->check(CLI::Range(1, kMostFrames)),
-            verb.add_option("--effects", effects_,
-                            "Of the gather: auto (what the scene calls for), all, or names with commas")
-                ->capture_default_str()};
+    own_ = {
+        verb.add_option("--quality", quality_, "Of the gather: a row of settings")
+            ->check(
+                CLI::IsMember(std::vector<std::string>(kQualities.begin(), kQualities.end())).description(""))
+            ->capture_default_str(),
+        verb.add_option("--set", settings_,
+                        "Of the gather: NAME=VALUE of one setting, as often as wanted; --help-settings "
+                        "lists them")
+            ->allow_extra_args(false),
+        verb.add_option("--accumulate", frames_,
+                        "Of the gather: frames that it averages; by default the quality's, 16 at medium")
+            ->check(CLI::Range(1, kMostFrames)),
+        verb.add_option("--effects", effects_,
+                        "Of the gather: auto (what the scene calls for), all, or names with commas, and then "
+                        "what they "
+                        "leave out of light and alpha is not there: " +
+                            effect_names())
+            ->capture_default_str()};
     verb.add_option("--bounces", bounces_,
                     "Indirect bounces; 0 is emission and direct light. The gather reaches 0 or 1 (default); "
                     "the path tracer has no limit unless one is given")
         ->check(CLI::Range(0, 1 << 20));
-    verb.add_flag_callback("--help-settings", list_settings,
-                           "List the settings of the gather with their values at medium quality, and end");
+    // After --quality, which it follows.
+    verb.add_flag_callback(
+        "--help-settings", [this] { list_settings(quality_); },
+        "List the settings of the gather with their values at --quality, where the others differ, and end");
 }
 
 std::vector<std::string> GatherFlags::given() const {

@@ -99,7 +99,8 @@ ReferencePicture reference_picture(const Program& program, const RenderOptions& 
         core::Frame frame = render_frame(program, options, scene, camera, tracers);
         reference.seconds = clock.lap();
         reference.render_seconds = reference.seconds;
-        core::ExrAttributes attributes = picture_attributes(options, scene, camera, frame);
+        core::ExrAttributes attributes =
+            picture_attributes(options, scene, core::scene_hash(scene), camera, frame);
         attributes[kKeyAttribute] = key;
         attributes[kPixelAttribute] = pixel_hash(frame.image);
         core::write_exr(file, frame.image, attributes);

@@ -55,9 +55,10 @@ void parse_crop(const std::string& text, RenderOptions& options) {
 
 /// Layers that one renderer alone can write.
 const std::map<std::string, RendererKind> kLayersOfOne = {
-    {"Variance", RendererKind::kPath},      {"BentNormal", RendererKind::kGather},
-    {"Probes", RendererKind::kGather},      {"RaysPerTexel", RendererKind::kGather},
-    {"ProbeWeight", RendererKind::kGather}, {"FilmSamples", RendererKind::kGather}};
+    {"Variance", RendererKind::kPath},          {"BentNormal", RendererKind::kGather},
+    {"Probes", RendererKind::kGather},          {"RaysPerTexel", RendererKind::kGather},
+    {"ProbeWeight", RendererKind::kGather},     {"FilmSamples", RendererKind::kGather},
+    {"ProbeHitDistance", RendererKind::kGather}};
 
 /// The flags that belong to one renderer alone; the others' are usage errors.
 void understand_renderer(const RenderFlags& flags, RenderOptions& options) {
@@ -152,7 +153,9 @@ void add_render_command(CLI::App& app, Program& program) {
                     .description(""))
         ->capture_default_str();
     verb->add_option("--size", flags->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    verb->add_option("--crop", flags->crop, "X,Y,W,H: renders this rectangle of the picture alone");
+    verb->add_option("--crop", flags->crop,
+                     "X,Y,W,H: writes this rectangle of the picture alone; the gather makes all "
+                     "of it before, the path tracer no more than this");
     add_camera_options(*verb, options.scene);
     flags->gather.add_to(*verb);
     verb->add_option(
@@ -180,7 +183,8 @@ void add_render_command(CLI::App& app, Program& program) {
             "--aov", flags->aovs,
             "Further layers: "
             "Depth,Normal,Albedo,Direct,IndirectDiffuse,IndirectSpecular,HitDistance,Steps; of the path "
-            "tracer Variance; of the gather BentNormal,Probes,RaysPerTexel,ProbeWeight,FilmSamples")
+            "tracer Variance; of the gather BentNormal,Probes,RaysPerTexel,ProbeHitDistance,ProbeWeight,"
+            "FilmSamples")
         ->delimiter(',');
     verb->add_flag("--half", options.half, "16-bit colour layers; saturates at 65,504");
     verb->add_flag("--png", options.png, "Write a tone-mapped preview beside the EXR");

@@ -43,7 +43,9 @@ nlohmann::json statistics_of(const Program& program, const RenderOptions& option
     }
     const sdf::SdfTracer::Statistics fields =
         tracers.sdf ? tracers.sdf->statistics() : sdf::SdfTracer::Statistics{};
-    const double pixel_count = static_cast<double>(frame.image.pixel_count());
+    // Those that were rendered: the gather cuts a crop out of the whole picture.
+    const double pixel_count = gathers ? static_cast<double>(options.width) * options.height
+                                       : static_cast<double>(frame.image.pixel_count());
     std::string command = "fieldlight";
     for (const std::string& argument : program.arguments) command += " " + argument;
     return {
@@ -113,8 +115,8 @@ core::Frame render_frame(const Program& program, const RenderOptions& options, c
 }
 
 core::ExrAttributes picture_attributes(const RenderOptions& options, const core::Scene& scene,
-                                       const core::Camera& camera, const core::Frame& frame,
-                                       const gather::Plan& plan) {
+                                       const std::string& scene_hash, const core::Camera& camera,
+                                       const core::Frame& frame, const gather::Plan& plan) {
     const core::CameraRays rays(camera, options.width, options.height);
     core::ExrAttributes attributes;
     // OpenEXR's camera space is left-handed and looks along +Z; glTF's looks along -Z.
@@ -122,13 +124,16 @@ core::ExrAttributes picture_attributes(const RenderOptions& options, const core:
                             glm::dvec4(0, 0, 0, 1));
     attributes["worldToCamera"] = glm::mat4(flip_z * rays.camera_from_world());
     attributes["worldToNDC"] = glm::mat4(rays.ndc_from_world());
-    attributes["samplesPerPixel"] = static_cast<int>(frame.samples_per_pixel);
+    const bool gathers = options.renderer == RendererKind::kGather;
+    // Without temporal accumulation the picture is the last frame alone.
+    const bool last_alone = gathers && !plan.on(gather::Effect::kTemporal);
+    attributes["samplesPerPixel"] = last_alone ? 1 : static_cast<int>(frame.samples_per_pixel);
     attributes["seed"] = std::to_string(options.seed);
     attributes["fieldlightVersion"] = std::string(FIELDLIGHT_VERSION);
     attributes["renderer"] = std::string(name_of(options.renderer));
     attributes["tracer"] = std::string(name_of(options.tracer));
     attributes["primary"] = std::string(name_of(options.primary));
-    if (options.renderer == RendererKind::kGather) {
+    if (gathers) {
         attributes["bounces"] = std::to_string(options.gather.bounces);
         for (const gather::SettingDescription& setting : gather::describe_settings(options.gather)) {
             attributes[setting.name] = setting.value;
@@ -144,9 +149,11 @@ core::ExrAttributes picture_attributes(const RenderOptions& options, const core:
         attributes["bounces"] =
             options.bounces < 0 ? std::string("unlimited") : std::to_string(options.bounces);
     }
-    attributes["sceneHash"] = core::scene_hash(scene);
-    attributes["sky"] = scene.sky_description;
-    attributes["sun"] = options.scene.sun.empty() ? std::string("none") : options.scene.sun;
+    attributes["sceneHash"] = scene_hash;
+    const bool has_sky = !gathers || plan.on(gather::Effect::kSky);
+    const bool has_sun = !options.scene.sun.empty() && (!gathers || plan.on(gather::Effect::kSun));
+    attributes["sky"] = has_sky ? scene.sky_description : std::string("none");
+    attributes["sun"] = has_sun ? options.scene.sun : std::string("none");
     if (traces_fields(options)) {
         attributes["hitMode"] = std::string(name_of(options.hit_mode));
         attributes["sampleBits"] = std::to_string(static_cast<int>(options.bake.sample_bits));
@@ -196,6 +203,7 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     core::Scene scene = load_scene(program, options.scene);
     const core::Camera camera =
         choose_camera(program, options.scene, scene, static_cast<double>(options.width) / options.height);
+    const std::string scene_hash = core::scene_hash(scene);  // Of all that is there, whatever the plan drops.
     gather::Plan plan;
     if (options.renderer == RendererKind::kGather) {
         plan = gather::make_plan(scene, options.width, options.height, options.gather, options.effects,
@@ -221,8 +229,9 @@ nlohmann::json run_render(const Program& program, const RenderOptions& options) 
     const core::Frame frame = render_frame(program, options, scene, camera, tracers, plan);
     const double render_seconds = clock.lap();
 
-    const std::size_t saturated = core::write_exr(
-        options.output, frame.image, picture_attributes(options, scene, camera, frame, plan), options.half);
+    const std::size_t saturated =
+        core::write_exr(options.output, frame.image,
+                        picture_attributes(options, scene, scene_hash, camera, frame, plan), options.half);
     if (saturated > 0) {
         warn(program, fmt::format("'{}': {} values beyond 65,504 were saturated by --half",
                                   options.output.string(), saturated));

@@ -62,10 +62,10 @@ core::Frame render_frame(const Program& program, const RenderOptions& options, c
                          const core::Camera& camera, const SceneTracers& tracers,
                          const gather::Plan& plan = {});
 
-/// Everything that decided the picture, as the EXR keeps it.
+/// Everything that decided the picture, as the EXR keeps it. @param scene_hash before any plan was applied
 core::ExrAttributes picture_attributes(const RenderOptions& options, const core::Scene& scene,
-                                       const core::Camera& camera, const core::Frame& frame,
-                                       const gather::Plan& plan = {});
+                                       const std::string& scene_hash, const core::Camera& camera,
+                                       const core::Frame& frame, const gather::Plan& plan = {});
 
 /// Renders and writes everything that was promised. Returns the object of `--stats`.
 /// @throws core::InputError, core::Interrupted; std::runtime_error if a pixel is not finite (nothing is

@@ -59,15 +59,18 @@ std::uint64_t bytes_of(Effect effect, const Plan& plan, int width, int height, c
     const std::uint64_t adaptive = plan.on(Effect::kAdaptiveProbes)
                                        ? adaptive_limit(width, height, settings.screen_probes)
                                        : std::uint64_t{0};
+    // Where each tile's adaptive probes begin.
+    const std::uint64_t list =
+        plan.on(Effect::kAdaptiveProbes) ? (uniform + 1) * sizeof(std::uint32_t) : std::uint64_t{0};
     const std::uint64_t one_probe = probe_bytes(settings.screen_probes.resolution);
     const auto edge = static_cast<std::uint64_t>(settings.screen_probes.resolution);
     switch (effect) {
         case Effect::kScreenProbes:
             return uniform * one_probe;
         case Effect::kAdaptiveProbes:
-            return adaptive * one_probe;
+            return adaptive * one_probe + list;
         case Effect::kLightingPdf:  // The last frame's atlas.
-            return (uniform + adaptive) * one_probe;
+            return (uniform + adaptive) * one_probe + list;
         case Effect::kSpatialFilter:  // A pass reads one copy of the light and writes the other.
             return (uniform + adaptive) * edge * edge * (sizeof(glm::vec3) + 2);
         case Effect::kBentNormal: {

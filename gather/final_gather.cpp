@@ -134,6 +134,9 @@ private:
     void accumulate_pixels();
     void accumulate();
     void add_probe_layers(core::Image& image) const;
+    /// Each uniform probe's map over its tile.
+    template <typename Value>
+    void spread_over_tiles(const std::vector<Value>& texels, std::vector<float>& values) const;
 
     const core::RenderInputs& inputs_;
     const Settings& settings_;
@@ -347,17 +350,24 @@ void Picture::add_probe_layers(core::Image& image) const {
         image.add_color("Probes", colors);
     }
     if (inputs_.aovs.count("RaysPerTexel")) {
-        // Each uniform probe's map, spread over its tile.
-        std::vector<float>& values = image.add_channel("RaysPerTexel.Y");
-        for (int y = 0; y < visible_.height && !atlas_.ray_count.empty(); ++y) {
-            for (int x = 0; x < visible_.width; ++x) {
-                const int tile = (y / atlas_.spacing) * atlas_.tiles_x + x / atlas_.spacing;
-                const int u = (x % atlas_.spacing) * atlas_.resolution / atlas_.spacing;
-                const int v = (y % atlas_.spacing) * atlas_.resolution / atlas_.spacing;
-                values[visible_.index(x, y)] =
-                    atlas_.ray_count[static_cast<std::size_t>(tile) * atlas_.texel_count() +
-                                     static_cast<std::size_t>(v * atlas_.resolution + u)];
-            }
+        spread_over_tiles(atlas_.ray_count, image.add_channel("RaysPerTexel.Y"));
+    }
+    if (inputs_.aovs.count("ProbeHitDistance")) {
+        spread_over_tiles(atlas_.hit_distance, image.add_channel("ProbeHitDistance.Z"));
+    }
+}
+
+template <typename Value>
+void Picture::spread_over_tiles(const std::vector<Value>& texels, std::vector<float>& values) const {
+    if (texels.empty()) return;
+    for (int y = 0; y < visible_.height; ++y) {
+        for (int x = 0; x < visible_.width; ++x) {
+            const int tile = (y / atlas_.spacing) * atlas_.tiles_x + x / atlas_.spacing;
+            const int u = (x % atlas_.spacing) * atlas_.resolution / atlas_.spacing;
+            const int v = (y % atlas_.spacing) * atlas_.resolution / atlas_.spacing;
+            values[visible_.index(x, y)] =
+                static_cast<float>(texels[static_cast<std::size_t>(tile) * atlas_.texel_count() +
+                                          static_cast<std::size_t>(v * atlas_.resolution + u)]);
         }
     }
 }
@@ -391,10 +401,20 @@ core::Frame Picture::finish(int frame_count) {
 }
 
 void check_layers(const std::set<std::string>& layers) {
-    static const std::set<std::string> known = {
-        "Depth",       "Normal",     "Albedo", "Direct", "IndirectDiffuse", "IndirectSpecular",
-        "HitDistance", "BentNormal", "Steps",  "Probes", "RaysPerTexel",    "ProbeWeight",
-        "FilmSamples"};
+    static const std::set<std::string> known = {"Depth",
+                                                "Normal",
+                                                "Albedo",
+                                                "Direct",
+                                                "IndirectDiffuse",
+                                                "IndirectSpecular",
+                                                "HitDistance",
+                                                "BentNormal",
+                                                "Steps",
+                                                "Probes",
+                                                "RaysPerTexel",
+                                                "ProbeWeight",
+                                                "ProbeHitDistance",
+                                                "FilmSamples"};
     for (const std::string& layer : layers) {
         if (known.count(layer)) continue;
         std::string names;

@@ -17,9 +17,10 @@
 namespace gather {
 
 /// Layers it can write beside the beauty: Depth, Normal, Albedo, Direct, IndirectDiffuse, IndirectSpecular,
-/// HitDistance, BentNormal, Steps, Probes (where probes stand, by level), RaysPerTexel (of the nearest
-/// probe), ProbeWeight (sum of a pixel's plane weights). Direct + IndirectDiffuse + IndirectSpecular is the
-/// beauty.
+/// HitDistance (of camera rays), BentNormal, Steps, Probes (where probes stand, by level: white uniform,
+/// green and orange refined, red filled), RaysPerTexel and ProbeHitDistance (a tile's uniform probe, its map
+/// spread over the tile), ProbeWeight (sum of a pixel's plane weights), FilmSamples. Those of probes are the
+/// last frame's. Direct + IndirectDiffuse + IndirectSpecular is the beauty.
 class FinalGather : public core::Renderer {
 public:
     /// @param plan made from the same scene, size and settings

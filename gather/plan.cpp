@@ -118,8 +118,8 @@ private:
 
 std::string Planner::probe_layer() const {
     for (const std::string& layer : layers_) {
-        if (layer == "Probes" || layer == "RaysPerTexel" || layer == "ProbeWeight" ||
-            (layer == "BentNormal" && settings_.integrate.bent_normal)) {
+        if (layer == "Probes" || layer == "RaysPerTexel" || layer == "ProbeHitDistance" ||
+            layer == "ProbeWeight" || (layer == "BentNormal" && settings_.integrate.bent_normal)) {
             return layer;
         }
     }

@@ -84,9 +84,10 @@ const std::vector<Knob>& knobs() {
     constexpr auto kP = &Settings::screen_probes;
     constexpr auto kI = &Settings::integrate;
     static const std::vector<Knob> table = {
-        number("film.outline_samples", &Settings::film, &FilmSettings::outline_samples, 1, 64,
-               "of the film a frame, in pixels that an outline crosses; all but one take their light beside "
-               "them"),
+        number(
+            "film.outline_samples", &Settings::film, &FilmSettings::outline_samples, 1, 64,
+            "of the film a frame, in pixels that an outline crosses; all but one take their indirect light "
+            "from a sample beside them"),
         choice("lighting.sampled_emitters", kL, &L::sampled_emitters,
                {{"auto", SampledEmitters::kAuto},
                 {"none", SampledEmitters::kNone},
@@ -117,7 +118,8 @@ const std::vector<Knob>& knobs() {
         number("screen_probes.adaptive_threshold", kP, &P::adaptive_threshold, 0.0f, 1.0f,
                "interpolation fails where plane weights sum to less"),
         number("screen_probes.plane_sharpness", kP, &P::plane_sharpness, 0.0f, 1e8f,
-               "k in exp2(-k (plane distance / depth)^2)"),
+               "k in exp2(-k (plane distance / scale)^2), the scale the depth or, through long lenses and "
+               "without perspective, twice the height of what is seen"),
         flag("screen_probes.jitter_interpolation", kP, &P::jitter_interpolation,
              "moves a pixel within its plane before it reads its probes"),
         flag("screen_probes.probe_visibility", kP, &P::probe_visibility,

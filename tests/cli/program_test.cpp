@@ -103,16 +103,30 @@ void expect_channels(const core::Image& image, const std::vector<std::string>& c
     for (const std::string& channel : channels) EXPECT_NE(image.find(channel), nullptr) << channel;
 }
 
+TEST(Program, ListsEverySettingOfAQuality) {
+    const Outcome listed = run("render --quality ultra --help-settings");
+    EXPECT_EQ(listed.exit_code, 0);
+    for (const char* told :
+         {"--accumulate = 64 ", "draft 4, medium 16, high 32, ultra 64", "screen_probes.spacing = 8 ",
+          "draft 16, medium 16, high 8, ultra 8", "integrate.near_field_radius = 1 "}) {
+        EXPECT_NE(listed.text.find(told), std::string::npos) << told;
+    }
+    EXPECT_NE(run("render --help-settings").text.find("screen_probes.spacing = 16 "), std::string::npos);
+}
+
 TEST(Program, RendersWhatItPromises) {
     const tests::TemporaryFolder folder;
     const nlohmann::json statistics =
-        render_with(folder, "--accumulate 2 --aov Depth,Normal,BentNormal,Probes,RaysPerTexel,Steps");
+        render_with(folder,
+                    "--accumulate 2 --aov Depth,Normal,BentNormal,Probes,RaysPerTexel,ProbeHitDistance,"
+                    "ProbeWeight,FilmSamples,Steps");
     EXPECT_EQ(statistics["renderer"], "gather") << "the default";
     EXPECT_GT(statistics["memory"]["probe_bytes"].get<long>(), 0);
 
     const core::ExrFile picture = core::read_exr_file(folder.path() / "x.exr");
-    expect_channels(picture.image, {"R", "A", "Depth.Z", "Normal.X", "BentNormal.X", "Probes.R",
-                                    "RaysPerTexel.Y", "Steps.Y"});
+    expect_channels(picture.image,
+                    {"R", "A", "Depth.Z", "Normal.X", "BentNormal.X", "Probes.R", "RaysPerTexel.Y",
+                     "ProbeHitDistance.Z", "ProbeWeight.Y", "FilmSamples.Y", "Steps.Y"});
     const Outcome inspected = run("inspect " + (folder.path() / "x.exr").string() + " --json");
     for (const char* told : {"\"R\"", "Depth.Z", "worldToCamera"}) {
         EXPECT_NE(inspected.text.find(told), std::string::npos) << told;

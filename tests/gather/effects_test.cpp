@@ -6,7 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "core/trace/triangle_tracer.h"
 #include "gather/effect_costs.h"
+#include "gather/lighting/visible_surfaces.h"
+#include "gather/screen_probes/placement.h"
 #include "tests/support/analytic_scenes.h"
 #include "tests/support/gather_pictures.h"
 #include "tests/support/render_scenes.h"
@@ -39,7 +42,8 @@ core::Scene dark_room() {
 TEST(Effects, AutoEqualsAllInEveryLayer) {
     const std::set<std::string> layers = {
         "Depth",       "Normal",     "Albedo", "Direct", "IndirectDiffuse", "IndirectSpecular",
-        "HitDistance", "BentNormal", "Steps",  "Probes", "RaysPerTexel",    "ProbeWeight"};
+        "HitDistance", "BentNormal", "Steps",  "Probes", "RaysPerTexel",    "ProbeHitDistance",
+        "ProbeWeight"};
     core::Scene unlit = tests::area_lit_room();
     for (core::Material& material : unlit.materials) material.unlit = true;
     core::Scene lamp_alone = dark_room();
@@ -73,7 +77,7 @@ TEST(Effects, AutoEqualsAllInEveryLayer) {
 TEST(Effects, AutoEqualsAllInTheDarkWithEachLayerAlone) {
     gather::Settings settings;
     settings.frames = 2;
-    for (const char* layer : {"BentNormal", "Probes", "RaysPerTexel", "ProbeWeight"}) {
+    for (const char* layer : {"BentNormal", "Probes", "RaysPerTexel", "ProbeHitDistance", "ProbeWeight"}) {
         SCOPED_TRACE(layer);
         tests::expect_same_bits(render(dark_room(), settings, "auto", {layer}).frame.image,
                                 render(dark_room(), settings, "all", {layer}).frame.image);
@@ -168,6 +172,42 @@ TEST(Effects, WhatIsOffCostsNothingAndWhatIsOnSomething) {
     for (const Effect effect : {Effect::kScreenProbes, Effect::kAdaptiveProbes, Effect::kLightingPdf,
                                 Effect::kSpatialFilter, Effect::kBentNormal}) {
         EXPECT_GT(all.cost(effect, settings).bytes, 0u) << gather::name_of(effect);
+    }
+}
+
+/// What an atlas of a picture holds, against the formula that `--stats` states.
+TEST(Effects, TheCacheTakesNoMoreThanItsFormulaSays) {
+    const core::Scene scene = tests::mixed_room();
+    const core::TriangleTracer tracer(scene);
+    const core::Camera camera = tests::room_camera();
+    core::RenderInputs inputs = tests::pass_inputs(scene, tracer, camera);
+    inputs.width = kWidth;
+    inputs.height = kHeight;
+    const gather::SceneLighting lighting(scene, tracer, {});
+    gather::VisibleSurfaces visible;
+    gather::find_visible_surfaces(inputs, lighting, std::vector<std::uint32_t>(kWidth * kHeight, 0), visible);
+    gather::Settings settings;
+    settings.screen_probes.spacing = 8;
+    for (const float budget : {0.0f, 0.1f, 4.0f}) {
+        SCOPED_TRACE(budget);
+        settings.screen_probes.adaptive_budget = budget;
+        gather::Plan plan;
+        plan.effects[static_cast<std::size_t>(Effect::kScreenProbes)].on = true;
+        plan.effects[static_cast<std::size_t>(Effect::kAdaptiveProbes)].on = budget > 0.0f;
+        gather::ProbeAtlas atlas;
+        gather::place_probes(visible, settings.screen_probes, budget > 0.0f, 0, 1, atlas);
+        atlas.allocate_texels();
+        atlas.sh.resize(atlas.probes.size());
+        const std::uint64_t bytes =
+            atlas.probes.size() * sizeof(gather::Probe) + atlas.radiance.size() * sizeof(glm::vec3) +
+            atlas.hit_distance.size() * sizeof(float) + atlas.ray_count.size() +
+            atlas.sh.size() * sizeof(core::ShColor) + atlas.adaptive_begin.size() * sizeof(std::uint32_t);
+        const std::uint64_t stated = gather::probe_cache_bytes(plan, kWidth, kHeight, settings);
+        EXPECT_LE(bytes, stated);
+        // A small budget is used up.
+        if (budget < 1.0f) {
+            EXPECT_EQ(bytes, stated);
+        }
     }
 }
 

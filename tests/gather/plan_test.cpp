@@ -221,7 +221,7 @@ TEST(GatherPlan, ASettingThatIsOffKeepsItsEffectOffWhateverIsAskedFor) {
 }
 
 TEST(GatherPlan, ALayerThatShowsProbesCallsForThem) {
-    for (const char* layer : {"Probes", "RaysPerTexel", "ProbeWeight", "BentNormal"}) {
+    for (const char* layer : {"Probes", "RaysPerTexel", "ProbeHitDistance", "ProbeWeight", "BentNormal"}) {
         const gather::Plan plan = plan_of(dark_box(), "auto", {}, {"Depth", layer});
         EXPECT_TRUE(plan.on(Effect::kScreenProbes)) << layer;
         EXPECT_NE(plan[Effect::kScreenProbes].reason.find(layer), std::string::npos);
