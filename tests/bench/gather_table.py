@@ -5,8 +5,9 @@
 
 budget: equal time, by the renderer's clock and by the wall's. truth: cranked up, then each approximation back on;
 small by default (96x72, 16 frames, 8 seeds, of the ledger 4, references of 16,384 samples, the diffuse views of
-assets/; a view may ask for more in views.json), so that it can be run. ablation: each technique off alone, at equal probe rays. effects: auto against all on every scene. proof: a scene that each effect
-is needed in (320x240, 8 seeds). speed: medians by pass of a draft frame. Exit code 1 where a gate fails.
+assets/; a view may ask for more in views.json), so that it can be run. ablation: each technique switched alone,
+at equal probe rays. effects: auto against all on every scene. proof: a scene that each effect is needed in
+(320x240, 8 seeds). speed: medians by pass of a draft frame. Exit code 1 where a gate fails.
 Errors are relMSE without the reference's noise (and in truth without the gather's), FLIP, energy bias in %.
 """
 
@@ -51,7 +52,8 @@ TECHNIQUES = ["screen_probes__adaptive", "screen_probes__importance_sampling", "
               "screen_probes__probe_visibility", "integrate__reflections", "integrate__reflection_neighbors",
               "integrate__near_field_radius", "film__outline_samples"]
 # What is not a switch.
-OFF = {"film__outline_samples": 1, "integrate__reflection_neighbors": 0, "integrate__near_field_radius": 0}
+OFF = {"film__outline_samples": 1, "integrate__reflection_neighbors": 0, "integrate__near_field_radius": 0,
+       "screen_probes__jitter_interpolation": "on"}  # Which medium leaves off.
 PROBE_PASSES = ("place_probes", "near_field", "filter_probes", "integrate", "bent_normal", "bent_normal_shadows")
 
 
@@ -130,8 +132,8 @@ def budget(run, options):
     text = table(["scene", "seconds", "probe rays", "shadow rays", "bent-normal rays",
                   "other rays a pixel a frame, besides the first one",
                   "gather: relMSE, FLIP, bias", "path: relMSE, FLIP, bias", "relMSE ratio", "FLIP ratio",
-                  "wall seconds", "relMSE ratio at these"], rows)
-    return text + f"\n\nAt {options.size}. Geometric mean over the diffuse scenes: relMSE {mean:.2f}, FLIP {flip_mean:.2f}", records, failed
+                  "process seconds", "relMSE ratio at these"], rows)
+    return text + f"\n\nGeometric mean over the diffuse scenes: relMSE {mean:.2f}, FLIP {flip_mean:.2f}.", records, failed
 
 
 def truth(run, options):
@@ -162,8 +164,7 @@ def truth(run, options):
                 failed.append(f"{view['name']}, {tracer}: +- {deviation:.1e} is too noisy to tell; raise --seeds")
     text = table(["scene", "tracer", "settings", "seeds", "reference samples", "relMSE, both variances subtracted",
                   "standard error", "bias"], rows)
-    return text + (f"\n\nAt {options.size}, {options.frames} frames; fields against the path tracer on fields."), \
-        records, failed
+    return text + "\n\nFields against the path tracer on fields.", records, failed
 
 
 def ablation(run, options):
@@ -185,10 +186,12 @@ def ablation(run, options):
             records.append({"scene": view["name"], "off": name, "ms": milliseconds, "errors": errors,
                             "frames": frames,
                             "probe_rays_a_frame": rays(stats, "trace_probes")})
-            rows.append([view["name"], name, f"{corrected(errors):.3g}", f"{errors['percentiles']['99']:.3g}",
+            value = OFF.get(name.replace(".", "__"), "off")
+            label = name if name == "nothing" else f"{name} = {value}"
+            rows.append([view["name"], label, f"{corrected(errors):.3g}", f"{errors['percentiles']['99']:.3g}",
                          f"{errors['flip']:.4f}", f"{milliseconds:.1f}", frames,
                          f"{rays(stats, 'trace_probes') * frames:.2f}"])
-    return table(["scene", "off", "relMSE", "P99", "FLIP", "ms a frame", "frames",
+    return table(["scene", "switched", "relMSE", "P99", "FLIP", "ms a frame", "frames",
                   "probe rays a pixel, all frames"], rows), records, []
 
 
@@ -296,8 +299,22 @@ def speed(run, options):
         failed += [f"{view['name']}: {text}" for text, wrong in
                    ((f"{ratio:.2f}x direct light, not 4x", ratio > 4), (f"probe passes take {share:.2f}", share > 0.5),
                     (f"two threads give {scaling:.2f}x", scaling < 1.8)) if wrong]
-    return table(["scene", "ms a frame", "of direct light", "probe passes but tracing", "and but bent normals",
+    return table(["scene", "ms a frame", "over direct light alone", "share of probe passes without tracing", "and without bent normals",
                   "one to two threads", "cache MiB", "ms by pass"], rows), records, failed
+
+
+def conditions(options):
+    """The command, and what it was measured at."""
+    words = [word for word in sys.argv[2:] if word not in ("--readme",)]
+    kept = [word for i, word in enumerate(words)
+            if not any(flag in (word, words[i - 1] if i else "") for flag in ("--fieldlight", "--json", "--shared"))]
+    quality = {"speed": "draft", "truth": "truth mode"}.get(options.what, "medium")
+    reference = {"budget": options.reference_spp, "ablation": options.reference_spp, "proof": options.reference_spp}
+    samples = f", references of {reference[options.what]:,} samples" if options.what in reference else ""
+    seeds = f", {options.seeds} seeds" if options.what == "proof" else ""
+    frames = "" if options.what == "proof" else f", {options.frames} frames"
+    return (f"`tests/bench/gather_table.py {' '.join([options.what] + kept)}`: {options.size}, {quality}{frames}, "
+            f"one bounce, triangles{' and fields' if options.what == 'truth' else ''}{samples}{seeds}.")
 
 
 def main():
@@ -322,6 +339,9 @@ def main():
         options.reference_spp = options.reference_spp or 4096
     with tempfile.TemporaryDirectory() as folder:
         text, records, failed = commands[options.what](Runner(options, folder), options)
+    text += "\n\n" + conditions(options)
+    if failed:
+        text += " Gates that fail: " + "; ".join(failed) + "."
     print(text)
     if options.json:
         pathlib.Path(options.json).write_text(json.dumps(records, indent=1))
