@@ -300,7 +300,8 @@ void add_compare_command(CLI::App& app, Program& program) {
         "compare",
         "Measure how far a picture is from its reference, exit code 1 where the numbers come with a warning, "
         "2 "
-        "where a threshold is exceeded; or fields from triangles on a scene, accuracy against time");
+        "where a threshold is exceeded; or fields with triangles and the gather with the path tracer on a "
+        "scene, accuracy against time");
     add_common_options(verb, program.common);
     verb.add_option("pictures", options->inputs,
                     "The picture under test, then its reference: .exr or .hdr; or one scene: .gltf or .glb")
@@ -337,7 +338,9 @@ void add_compare_command(CLI::App& app, Program& program) {
         "  fieldlight compare sdf.exr triangles.exr --flip-map flip.png --fail-flip 0.05\n"
         "  fieldlight compare assets/two_rooms.glb -o report\n"
         "  fieldlight compare room.glb -o report --sky 500,600,800 --sun 30,40,60000 --resolutions 128,256 "
-        "--max-spp 32");
+        "--max-spp 32\n"
+        "  fieldlight compare assets/two_rooms.glb -o report --renderers path,gather --resolutions 128 --set "
+        "screen_probes.spacing=8");
     verb.callback([options, &program] { run_verb(program, [&] { compare(*options, program); }); });
 }
 

@@ -101,11 +101,12 @@ core::Image make_reference(const Program& program, const CompareSceneOptions& op
                            Report& report) {
     RenderOptions render = triangles.render;
     render.output = "reference.exr";
+    render.renderer = RendererKind::kPath;
     render.samples_per_pixel = options.reference_samples;
     render.seed = program.common.seed + kReferenceSeedDistance;
     render.aovs = {"Variance"};
     ReferencePicture reference =
-        reference_picture(program, render, scene, camera, triangles.tracers, options.folder / "reference");
+        reference_picture(program, render, scene, camera, *triangles.tracers, options.folder / "reference");
     report.reference_samples = render.samples_per_pixel;
     report.reference_seed = render.seed;
     report.reference_reused = reference.reused;
@@ -119,7 +120,7 @@ core::Image make_reference(const Program& program, const CompareSceneOptions& op
 ReportGeometry compare_geometry(const CompareSceneOptions& options, const core::Scene& scene,
                                 const core::Camera& camera, const Method& triangles, const Method& fields,
                                 std::uint64_t seed) {
-    const core::TracerPair pair{scene, *triangles.tracers.triangle, *fields.tracers.sdf,
+    const core::TracerPair pair{scene, *triangles.tracers->triangle, *fields.tracers->sdf,
                                 fields.voxel_of_mesh};
     const auto short_seed = static_cast<std::uint32_t>(seed);
     const core::RayStream rays =
@@ -150,12 +151,13 @@ ReportGeometry compare_geometry(const CompareSceneOptions& options, const core::
 std::vector<float> step_picture(const Program& program, const core::Scene& scene, const core::Camera& camera,
                                 const Method& method) {
     RenderOptions options = method.render;
+    options.renderer = RendererKind::kPath;
     options.output = method.file_stem() + "_steps.exr";
     options.samples_per_pixel = kStepSamples;
     options.bounces = 0;
     options.seed = program.common.seed;
     options.aovs = {"Steps"};
-    const core::Frame frame = render_frame(program, options, scene, camera, method.tracers);
+    const core::Frame frame = render_frame(program, options, scene, camera, *method.tracers);
     return *frame.image.find("Steps.Y");
 }
 
@@ -177,7 +179,7 @@ ReportPicture picture_of(const Program& program, const core::Scene& scene, const
     picture.radiance = *method.last.color();
     picture.flip = method.last_flip;
     picture.relative_error = relative_errors(picture.radiance, reference);
-    if (method.tracers.sdf) picture.steps = step_picture(program, scene, camera, method);
+    if (method.tracers->sdf) picture.steps = step_picture(program, scene, camera, method);
     return picture;
 }
 
@@ -230,7 +232,8 @@ Report measure(const Program& program, const CompareSceneOptions& options) {
                  camera, reference, methods);
     report.geometry_rays = kGeometryRays;
     for (const Method& method : methods) {
-        if (!method.tracers.sdf) continue;
+        // Rays know nothing of the renderer: fields are compared once.
+        if (!method.tracers->sdf || method.render.renderer != options.renderers.front()) continue;
         report.geometry.push_back(
             compare_geometry(options, scene, camera, triangles, method, program.common.seed));
     }

@@ -1,14 +1,17 @@
-// cli/compare_scene.h: `fieldlight compare SCENE`: fields against triangles, accuracy against time.
+// cli/compare_scene.h: `fieldlight compare SCENE`: fields against triangles, the gather against the path
+// tracer, accuracy against time.
 //
-// A reference with its variance, path-traced on triangles; then every method (triangles, and fields at each
-// resolution) at 1, 2, 4, ... samples a pixel, interleaved, every rung a fresh picture with its own seed;
-// then the fields' rays against the triangles' rays. What comes out is a cli::Report.
+// A reference with its variance, path-traced on triangles; then every method (each renderer over triangles,
+// and over fields at each resolution) at 1, 2, 4, ... samples a pixel, which are frames of the gather,
+// interleaved, every rung a fresh picture with its own seed; then the fields' rays against the triangles'
+// rays. What comes out is a cli::Report.
 #pragma once
 
 #include <filesystem>
 #include <vector>
 
 #include "cli/options.h"
+#include "cli/render_job.h"
 #include "cli/scene_setup.h"
 #include "sdf/field_kernel.h"
 
@@ -20,7 +23,9 @@ struct CompareSceneOptions {
     std::filesystem::path folder;       ///< Everything is written here.
     std::filesystem::path bake_folder;  ///< Holds a folder a resolution; empty: `fields` in `folder`.
     int width = 400, height = 225;
-    int bounces = -1;                               ///< -1: no limit.
+    std::vector<RendererKind> renderers = {RendererKind::kPath};  ///< None twice.
+    gather::Settings gather;                        ///< Of the gather's methods; the ladder sets `frames`.
+    int bounces = -1;                               ///< Of all methods; -1: no limit.
     std::vector<int> resolutions = {64, 128, 256};  ///< Voxels on the longest side; ascending, none twice.
     sdf::HitMode hit_mode = sdf::HitMode::kCubic;   ///< Of all fields.
     sdf::SampleBits sample_bits = sdf::SampleBits::k16;

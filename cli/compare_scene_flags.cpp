@@ -26,9 +26,13 @@ void CompareSceneFlags::add_to(CLI::App& verb) {
     add_scene_options(verb, options_.scene);
     add_camera_options(verb, options_.scene);
     verb.add_option("--size", size_, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    bounces_option_ = verb.add_option("--bounces", bounces_,
-                                      "Indirect bounces; 0 is emission and direct light; no limit by default")
-                          ->check(CLI::Range(0, 1 << 20));
+    verb.add_option("--renderers", renderers_,
+                    "Renderers to compare, with commas: path, gather. The reference is path-traced, and with "
+                    "the gather all have its one bounce unless --bounces says 0")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"path", "gather"}).description(""))
+        ->capture_default_str();
+    gather_.add_settings_to(verb);
     verb.add_option("--resolutions", options_.resolutions,
                     "Fields to compare: voxels on the longest side of each mesh's box")
         ->delimiter(',')
@@ -37,7 +41,7 @@ void CompareSceneFlags::add_to(CLI::App& verb) {
     add_hit_mode_option(verb, options_.hit_mode);
     add_sample_bits_option(verb, options_.sample_bits);
     verb.add_option("--max-spp", options_.max_samples,
-                    "The ladder is 1, 2, 4, ... samples a pixel up to this")
+                    "The ladder is 1, 2, 4, ... samples a pixel, of the gather frames, up to this")
         ->check(CLI::Range(1, 1 << 20))
         ->capture_default_str();
     verb.add_option("--reference-spp", options_.reference_samples, "Samples a pixel of the reference")
@@ -65,6 +69,30 @@ std::vector<std::string> CompareSceneFlags::given() const {
     return flags;
 }
 
+void CompareSceneFlags::understand_renderers(CompareSceneOptions& options) const {
+    const auto fail = [](const std::string& message) {
+        throw core::InputError(core::ErrorKind::kUsage, message);
+    };
+    options.renderers.clear();
+    for (const std::string& name : renderers_) {
+        const RendererKind kind = name == "path" ? RendererKind::kPath : RendererKind::kGather;
+        const auto& named = options.renderers;
+        if (std::find(named.begin(), named.end(), kind) != named.end()) {
+            fail(fmt::format("--renderers: {} is there twice", name));
+        }
+        options.renderers.push_back(kind);
+    }
+    if (std::count(options.renderers.begin(), options.renderers.end(), RendererKind::kGather) > 0) {
+        options.gather = gather_.settings();
+        options.bounces = options.gather.bounces;
+        return;
+    }
+    for (const std::string& flag : gather_.given()) {
+        fail(fmt::format("{} is of the gather, which --renderers does not name", flag));
+    }
+    options.bounces = gather_.bounces().value_or(-1);
+}
+
 CompareSceneOptions CompareSceneFlags::understand(const std::string& scene) const {
     CompareSceneOptions options = options_;
     options.scene.file = scene;
@@ -75,7 +103,7 @@ CompareSceneOptions CompareSceneFlags::understand(const std::string& scene) cons
     const glm::ivec2 size = parse_size(size_);
     options.width = size.x;
     options.height = size.y;
-    if (bounces_option_->count() > 0) options.bounces = bounces_;
+    understand_renderers(options);
     std::sort(options.resolutions.begin(), options.resolutions.end());
     const auto twice = std::adjacent_find(options.resolutions.begin(), options.resolutions.end());
     if (twice != options.resolutions.end()) fail(fmt::format("--resolutions: {} is there twice", *twice));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cli/compare_scene.h"
+#include "cli/gather_flags.h"
 
 namespace cli {
 
@@ -21,10 +22,12 @@ public:
     CompareSceneOptions understand(const std::string& scene) const;
 
 private:
+    void understand_renderers(CompareSceneOptions& options) const;
+
     CompareSceneOptions options_;
     std::string size_ = "400x225";
-    int bounces_ = 0;
-    const CLI::Option* bounces_option_ = nullptr;
+    std::vector<std::string> renderers_ = {"path"};
+    GatherFlags gather_;
     std::vector<const CLI::Option*> all_;
 };
 

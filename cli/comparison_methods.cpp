@@ -64,11 +64,11 @@ double median_voxel(const core::Scene& scene, const std::vector<double>& voxel_o
 RenderOptions render_options(const CompareSceneOptions& options, TracerKind kind) {
     RenderOptions render;
     render.scene = options.scene;
-    render.renderer = RendererKind::kPath;
     render.tracer = render.primary = kind;
     render.width = options.width;
     render.height = options.height;
     render.bounces = options.bounces;
+    render.gather = options.gather;
     return render;
 }
 
@@ -76,10 +76,12 @@ Method triangles(const CompareSceneOptions& options, const core::Scene& scene) {
     Method method;
     method.render = render_options(options, TracerKind::kTriangle);
     StageClock clock;
-    method.tracers.triangle = std::make_unique<core::TriangleTracer>(scene);
+    SceneTracers tracers;
+    tracers.triangle = std::make_unique<core::TriangleTracer>(scene);
     method.series.build_seconds = clock.lap();
     method.series.method = "triangles";
-    method.series.bytes = method.tracers.triangle->bytes();
+    method.series.bytes = tracers.triangle->bytes();
+    method.tracers = std::make_shared<const SceneTracers>(std::move(tracers));
     return method;
 }
 
@@ -103,11 +105,13 @@ Method fields(const Program& program, const CompareSceneOptions& options, const 
     }
     StageClock clock;
     const auto grids = sdf::grids_by_mesh(scene, baked);
-    method.tracers.sdf = std::make_unique<sdf::SdfTracer>(scene, grids, options.hit_mode);
+    SceneTracers tracers;
+    tracers.sdf = std::make_unique<sdf::SdfTracer>(scene, grids, options.hit_mode);
     method.series.build_seconds = clock.lap();
     for (const auto& grid : grids) method.voxel_of_mesh.push_back(grid ? grid->voxel_size() : 0.0);
     method.series.median_voxel = median_voxel(scene, method.voxel_of_mesh);
-    method.series.bytes = method.tracers.sdf->bytes();
+    method.series.bytes = tracers.sdf->bytes();
+    method.tracers = std::make_shared<const SceneTracers>(std::move(tracers));
     return method;
 }
 
@@ -122,14 +126,21 @@ std::string Method::file_stem() const {
 std::vector<Method> prepare_methods(const Program& program, const CompareSceneOptions& options,
                                     const core::Scene& scene, double load_seconds,
                                     std::vector<std::string>& warnings) {
-    std::vector<Method> methods;
-    methods.push_back(triangles(options, scene));
+    std::vector<Method> traced;
+    traced.push_back(triangles(options, scene));
     for (const int resolution : options.resolutions) {
-        methods.push_back(fields(program, options, scene, resolution, warnings));
+        traced.push_back(fields(program, options, scene, resolution, warnings));
     }
-    for (Method& method : methods) {
-        method.series.tracer = name_of(method.render.tracer);
-        method.series.load_seconds = load_seconds;
+    std::vector<Method> methods;
+    for (const RendererKind renderer : options.renderers) {
+        for (Method method : traced) {
+            method.render.renderer = renderer;
+            method.series.renderer = name_of(renderer);
+            method.series.tracer = name_of(method.render.tracer);
+            method.series.load_seconds = load_seconds;
+            if (renderer == RendererKind::kGather) method.series.method = "gather " + method.series.method;
+            methods.push_back(std::move(method));
+        }
     }
     return methods;
 }

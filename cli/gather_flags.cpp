@@ -50,7 +50,7 @@ std::string effect_names() {
 
 }  // namespace
 
-void GatherFlags::add_to(CLI::App& verb) {
+void GatherFlags::add_settings_to(CLI::App& verb) {
     own_ = {
         verb.add_option("--quality", quality_, "Of the gather: a row of settings")
             ->check(
@@ -59,16 +59,7 @@ void GatherFlags::add_to(CLI::App& verb) {
         verb.add_option("--set", settings_,
                         "Of the gather: NAME=VALUE of one setting, as often as wanted; --help-settings "
                         "lists them")
-            ->allow_extra_args(false),
-        verb.add_option("--accumulate", frames_,
-                        "Of the gather: frames that it averages; by default the quality's, 16 at medium")
-            ->check(CLI::Range(1, kMostFrames)),
-        verb.add_option("--effects", effects_,
-                        "Of the gather: auto (what the scene calls for), all, or names with commas, and then "
-                        "what they "
-                        "leave out of light and alpha is not there: " +
-                            effect_names())
-            ->capture_default_str()};
+            ->allow_extra_args(false)};
     verb.add_option("--bounces", bounces_,
                     "Indirect bounces; 0 is emission and direct light. The gather reaches 0 or 1 (default); "
                     "the path tracer has no limit unless one is given")
@@ -77,6 +68,19 @@ void GatherFlags::add_to(CLI::App& verb) {
     verb.add_flag_callback(
         "--help-settings", [this] { list_settings(quality_); },
         "List the settings of the gather with their values at --quality, where the others differ, and end");
+}
+
+void GatherFlags::add_to(CLI::App& verb) {
+    add_settings_to(verb);
+    own_.push_back(
+        verb.add_option("--accumulate", frames_,
+                        "Of the gather: frames that it averages; by default the quality's, 16 at medium")
+            ->check(CLI::Range(1, kMostFrames)));
+    own_.push_back(verb.add_option("--effects", effects_,
+                                   "Of the gather: auto (what the scene calls for), all, or names with "
+                                   "commas, and then what they leave out of light and alpha is not there: " +
+                                       effect_names())
+                       ->capture_default_str());
 }
 
 std::vector<std::string> GatherFlags::given() const {

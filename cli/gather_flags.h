@@ -16,7 +16,11 @@ inline constexpr int kMostFrames = 1 << 16;
 
 class GatherFlags {
 public:
-    /// Declares --quality, --set, --help-settings, --accumulate, --bounces and --effects.
+    /// Declares --quality, --set, --bounces and --help-settings: how a picture is made, but for how many
+    /// frames it takes.
+    void add_settings_to(CLI::App& verb);
+
+    /// These, --accumulate and --effects.
     void add_to(CLI::App& verb);
 
     /// Those given of which another renderer knows nothing: all but --bounces.

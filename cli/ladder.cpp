@@ -23,9 +23,19 @@ struct Ladder {
     RenderOptions rung_options(const Method& method, int samples, std::uint64_t rung) const {
         RenderOptions options = method.render;
         options.samples_per_pixel = samples;
+        options.gather.frames = samples;
         options.seed = settings.seed + rung;
-        options.output = fmt::format("{}_{}spp.exr", method.file_stem(), samples);
+        options.output = fmt::format("{}_{}{}.exr", method.file_stem(), samples,
+                                     options.renderer == RendererKind::kGather ? "frames" : "spp");
         return options;
+    }
+
+    core::Frame render(const Method& method, const RenderOptions& options) const {
+        gather::Plan plan;
+        if (options.renderer == RendererKind::kGather) {
+            plan = gather::make_plan(scene, options.width, options.height, options.gather, options.effects);
+        }
+        return render_frame(program, options, scene, camera, *method.tracers, plan);
     }
 
     /// Returns the wall time of the rendering.
@@ -38,7 +48,7 @@ struct Ladder {
 
         const double cpu_start = process_cpu_seconds();
         StageClock clock;
-        core::Frame frame = render_frame(program, options, scene, camera, method.tracers);
+        core::Frame frame = render(method, options);
         point.seconds = clock.lap();
         point.cpu_seconds = process_cpu_seconds() - cpu_start;
         point.rays = frame.rays;
@@ -48,8 +58,8 @@ struct Ladder {
         set_stages(frame, method.series);
         method.last = std::move(frame.image);
         note(program,
-             fmt::format("{}, {} samples a pixel: {:.2f} s, relMSE {:.4g}, FLIP {:.4f}", method.series.method,
-                         samples, point.seconds, point.rel_mse.value, point.flip));
+             fmt::format("{}, {}: {:.2f} s, relMSE {:.4g}, FLIP {:.4f}", method.series.method,
+                         method.series.rung_name(samples), point.seconds, point.rel_mse.value, point.flip));
         method.series.points.push_back(std::move(point));
         return method.series.points.back().seconds;
     }
@@ -81,7 +91,7 @@ void climb_ladder(const Program& program, const LadderSettings& settings, const 
                   const core::Camera& camera, const core::Image& reference, std::vector<Method>& methods) {
     const Ladder ladder{program, settings, scene, camera, reference, *reference.color()};
     for (const Method& method : methods) {
-        render_frame(program, ladder.rung_options(method, 1, 0), scene, camera, method.tracers);
+        ladder.render(method, ladder.rung_options(method, 1, 0));
     }
     double spent = 0.0;
     std::uint64_t rung = 0;

@@ -1,4 +1,5 @@
-// cli/ladder.h: every method at 1, 2, 4, ... samples a pixel: what it cost and how far off it was.
+// cli/ladder.h: every method at 1, 2, 4, ... samples a pixel (frames of the gather): what it cost and how far
+// off it was.
 #pragma once
 
 #include <cstdint>

@@ -32,10 +32,10 @@ struct StageCost {
 
 /// One rung of a ladder: one method at one number of samples.
 struct ReportPoint {
-    int samples_per_pixel = 0;
-    std::uint64_t seed = 0;    ///< Every rung has its own, the same for all methods.
-    double seconds = 0.0;      ///< Wall time of the rendering alone (warm).
-    double cpu_seconds = 0.0;  ///< Processor time of the same, over all threads.
+    int samples_per_pixel = 0;  ///< Frames, where the gather made it.
+    std::uint64_t seed = 0;     ///< Every rung has its own, the same for all methods.
+    double seconds = 0.0;       ///< Wall time of the rendering alone (warm).
+    double cpu_seconds = 0.0;   ///< Processor time of the same, over all threads.
     std::uint64_t rays = 0;
     core::ImageMetrics metrics;  ///< Against the reference, as measured: its noise included.
     Estimate rel_mse;            ///< metrics.rel_mse without the reference's variance.
@@ -47,7 +47,8 @@ struct ReportPoint {
 
 /// One way of making the picture, with everything but the samples fixed.
 struct ReportSeries {
-    std::string method;         ///< Shown and unique: "triangles", "fields 128".
+    std::string method;         ///< Shown and unique: "triangles", "fields 128", "gather fields 128".
+    std::string renderer;       ///< path or gather
     std::string tracer;         ///< triangle or sdf
     int resolution = 0;         ///< Voxels on the longest side of a mesh; 0 for triangles.
     std::string hit_mode;       ///< eps, secant or cubic; empty for triangles.
@@ -68,6 +69,9 @@ struct ReportSeries {
     std::optional<Estimate> rel_mse_at_equal_time;  ///< At Report::equal_seconds.
 
     std::vector<StageCost> stages;  ///< Of the last rung.
+
+    /// One of its rungs, for a person: "4 spp", or of the gather "4 frames".
+    std::string rung_name(int samples) const;
 };
 
 /// Two methods at equal time, block by block against the one reference, so that its noise cancels.
@@ -79,7 +83,7 @@ struct PairedComparison {
 
 /// A scene's fields against its triangles on the same rays; definitions in core/trace/tracer_difference.h.
 struct ReportGeometry {
-    std::string method;  ///< Of the series it belongs to.
+    std::string method;  ///< Of the first series that traces these fields.
     int resolution = 0;
     std::uint64_t rays = 0;
     std::uint64_t either = 0;              ///< Rays that hit in either tracer.

@@ -58,6 +58,7 @@ const Column kColumns[] = {
     {"pareto", [](const Series&, const Point& p) { return std::string(p.pareto ? "1" : "0"); }},
     {"command", [](const Series&, const Point& p) { return field(p.command); }},
     {"hit_mode", [](const Series& s, const Point&) { return field(s.hit_mode); }},
+    {"renderer", [](const Series& s, const Point&) { return field(s.renderer); }},
 };
 
 }  // namespace

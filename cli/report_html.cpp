@@ -39,6 +39,9 @@ const Term kTerms[] = {
      "the picture under test, the reference, Rec. 709 luminance; linear radiance in cd/m². Means run over "
      "pixels and "
      "channels."},
+    {"Methods",
+     "triangles, and fields by their voxels on the longest side of a mesh, through the path tracer; through "
+     "the gather where its name stands before them. Samples of the gather are the frames that it averages."},
     {"relMSE", "mean (I − R)² / (R² + 0.01), untrimmed. The reference’s own variance is subtracted."},
     {"Relative error", "100 √relMSE, in percent. Shown as 0 where the subtracted variance was the larger."},
     {"b, v",
@@ -245,9 +248,9 @@ std::string commands(const Report& report) {
         if (series.points.empty()) continue;
         html += fmt::format("<h3>{}</h3>\n", series_name(report, i));
         for (std::size_t k = 0; k < series.points.size(); ++k)
-            html += command_line(fmt::format("run-{}-{}", i, k),
-                                 fmt::format("{} spp", series.points[k].samples_per_pixel),
-                                 series.points[k].command);
+            html +=
+                command_line(fmt::format("run-{}-{}", i, k),
+                             series.rung_name(series.points[k].samples_per_pixel), series.points[k].command);
     }
     return "<p class=\"note\">Each renders the picture of its point. A click selects a whole command.</p>\n"
            "<div class=\"commands\">\n" +

@@ -45,7 +45,8 @@ json as_json(const ReportSeries& series) {
     for (const ReportPoint& point : series.points) points.push_back(as_json(point));
     return {{"method", series.method},
             {"settings",
-             {{"tracer", series.tracer},
+             {{"renderer", series.renderer},
+              {"tracer", series.tracer},
               {"resolution", series.resolution},
               {"hit_mode", series.hit_mode.empty() ? json(nullptr) : json(series.hit_mode)},
               {"median_voxel", series.median_voxel}}},

@@ -258,9 +258,9 @@ private:
             const double x = x_.at(plotted.cost), y = y_of(plotted.error);
             const std::string error = estimate_text(point.rel_mse);
             const std::string title = fmt::format(
-                "{}, {} spp: {} s wall, {} s CPU, {} million rays; error {} %{}", source.method,
-                point.samples_per_pixel, significant(point.seconds), significant(point.cpu_seconds),
-                significant(static_cast<double>(point.rays) * 1e-6), error,
+                "{}, {}: {} s wall, {} s CPU, {} million rays; error {} %{}", source.method,
+                source.rung_name(point.samples_per_pixel), significant(point.seconds),
+                significant(point.cpu_seconds), significant(static_cast<double>(point.rays) * 1e-6), error,
                 point.pareto ? "" : "; dominated");
             svg += fmt::format(
                 "<a href=\"#run-{0}-{1}\" aria-label=\"{2}\" class=\"{3}\"><title>{2}</title>"

@@ -14,12 +14,16 @@ namespace {
 
 constexpr std::size_t kColors = 8;
 
-/// 0 for triangles, 1 to 7 for the others in their order.
+bool is_paths_on_triangles(const ReportSeries& series) {
+    return series.tracer == "triangle" && series.renderer != "gather";
+}
+
+/// 0 for paths on triangles, 1 to 7 for the others in their order.
 std::size_t place_of(const Report& report, std::size_t series) {
     assert(series < report.series.size());
-    if (report.series[series].tracer == "triangle") return 0;
+    if (is_paths_on_triangles(report.series[series])) return 0;
     std::size_t others = 0;
-    for (std::size_t i = 0; i < series; ++i) others += report.series[i].tracer != "triangle";
+    for (std::size_t i = 0; i < series; ++i) others += !is_paths_on_triangles(report.series[i]);
     return 1 + others % (kColors - 1);
 }
 

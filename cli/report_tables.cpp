@@ -257,7 +257,7 @@ std::string stage_table(const Report& report) {
 std::string runs_table(const Report& report) {
     const std::vector<Column> columns = {
         {"Method", "", "", true},
-        {"Samples", "a pixel", "links to the command"},
+        {"Samples", "a pixel", "of the gather frames; links to the command"},
         {"Seed", "", "of the random numbers: one a rung, the same for all methods", true},
         {"Wall", "s", "wall time of the rendering"},
         {"CPU", "s", "processor time over all threads"},

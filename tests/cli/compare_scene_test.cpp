@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -367,6 +369,78 @@ TEST_F(CompareScene, KeepsAReferenceForEachPicture) {
     }
 }
 
+TEST_F(CompareScene, SetsTheGatherAgainstThePathTracer) {
+    const std::string line = "fieldlight compare " + kScene +
+                             " -o both --bake-dir out/fields --size 64x36 --resolutions 32 --max-spp 4 "
+                             "--reference-spp 64 --seed 5 --renderers path,gather --quality draft";
+    const Outcome outcome = place_->run(line);
+    ASSERT_EQ(outcome.exit_code, 1) << outcome.err;  // Of the reference's noise.
+    const json report = json::parse(text_of(place_->path("both/report.json")));
+    EXPECT_EQ(report.at("bounces"), 1) << "the gather has no more, so that nobody has";
+    const std::vector<std::string> methods = {"triangles", "fields 32", "gather triangles",
+                                              "gather fields 32"};
+    ASSERT_EQ(report.at("series").size(), methods.size());
+    EXPECT_EQ(report.at("geometry").size(), 1u) << "rays know nothing of the renderer";
+    const core::Image reference = core::read_exr(place_->path("both/pictures/reference.exr"));
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+        SCOPED_TRACE(methods[m]);
+        const json& series = report.at("series").at(m);
+        EXPECT_EQ(series.at("method"), methods[m]);
+        EXPECT_EQ(series.at("settings").at("renderer"), m < 2 ? "path" : "gather");
+        EXPECT_EQ(series.at("settings").at("tracer"), m % 2 ? "sdf" : "triangle");
+        ASSERT_EQ(series.at("points").size(), 3u);
+        std::set<std::string> stages;
+        for (const json& stage : series.at("stages")) stages.insert(stage.at("name"));
+        EXPECT_EQ(stages.count("trace_probes"), m < 2 ? 0u : 1u);
+        // What four frames of probes share is far more than four paths a pixel find.
+        const json& last = series.at("points").back();
+        if (m >= 2) {
+            EXPECT_LT(last.at("rel_mse").at("value").get<double>(), 0.5 * report.at("series")
+                                                                              .at(m - 2)
+                                                                              .at("points")
+                                                                              .back()
+                                                                              .at("rel_mse")
+                                                                              .at("value")
+                                                                              .get<double>());
+        }
+        const std::string command = last.at("command");
+        EXPECT_EQ(command.find("--renderer gather") != std::string::npos, m >= 2) << command;
+        const Outcome again = place_->run(command);
+        ASSERT_EQ(again.exit_code, 0) << again.err;
+        const std::size_t begin = command.find("-o ") + 3;
+        const core::Image made =
+            core::read_exr(place_->path(command.substr(begin, command.find(' ', begin) - begin)));
+        std::string stem = methods[m];
+        std::replace(stem.begin(), stem.end(), ' ', '_');
+        const core::Image kept = core::read_exr(place_->path("both/pictures/" + stem + ".exr"));
+        for (const char* channel : {"R", "G", "B"}) EXPECT_EQ(*made.find(channel), *kept.find(channel));
+    }
+    EXPECT_NE(outcome.err.find("gather fields 32, 4 frames"), std::string::npos) << outcome.err;
+    EXPECT_NE(text_of(place_->path("both/report.html")).find("4 frames"), std::string::npos);
+}
+
+TEST_F(CompareScene, MeasuresWhatASettingOfTheGatherCosts) {
+    const auto compare = [&](const std::string& folder, const std::string& more) {
+        const Outcome outcome =
+            place_->run("fieldlight compare " + kScene + " -o " + folder +
+                        " --bake-dir out/fields --size 64x36 --resolutions 32 --max-spp 1 "
+                        "--reference-spp 64 --seed 5 --renderers gather" +
+                        more);
+        EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+        return json::parse(text_of(place_->path(folder + "/report.json")));
+    };
+    const json usual = compare("usual", ""), fewer = compare("fewer", " --set screen_probes.spacing=32");
+    ASSERT_EQ(usual.at("series").size(), 2u);
+    for (std::size_t m = 0; m < 2; ++m) {
+        const json &before = usual.at("series").at(m).at("points").at(0),
+                   &after = fewer.at("series").at(m).at("points").at(0);
+        EXPECT_LT(after.at("rays"), before.at("rays"));
+        EXPECT_NE(after.at("command").get<std::string>().find("screen_probes.spacing=32"), std::string::npos);
+    }
+    const json direct = compare("direct", " --bounces 0");
+    EXPECT_EQ(direct.at("bounces"), 0);
+}
+
 TEST_F(CompareScene, EndsTheLadderWithItsBudget) {
     const Outcome outcome = place_->run("fieldlight compare " + kScene +
                                         " -o short --bake-dir out/fields --time-budget 1e-6" + kSmall);
@@ -385,12 +459,16 @@ TEST(CompareSceneErrors, RefuseWrongFlags) {
     };
     EXPECT_EQ(code(kScene + kSmall), 64);
     EXPECT_EQ(code(kScene + " " + kScene + " -o out"), 64);
-    for (const char* wrong : {"--resolutions 16,16", "--resolutions 2", "--max-spp 0", "--reference-spp 7",
-                              "--size 0x9", "--camera nobody", "--layer Direct", "--fail-mse 1",
-                              "--flip-map x.png", "--sun 1,2", "--time-budget 0"}) {
+    for (const char* wrong :
+         {"--resolutions 16,16", "--resolutions 2", "--max-spp 0", "--reference-spp 7", "--size 0x9",
+          "--camera nobody", "--layer Direct", "--fail-mse 1", "--flip-map x.png", "--sun 1,2",
+          "--time-budget 0", "--renderers nobody", "--renderers path,path", "--renderers gather --bounces 2",
+          "--renderers gather --set screen_probes.nothing=1", "--quality draft",
+          "--set screen_probes.spacing=32"}) {
         EXPECT_EQ(code(kScene + " -o out " + wrong), 64) << wrong;
     }
-    for (const char* wrong : {"--size 8x8", "--sky 1,1,1", "--max-spp 4", "-o out"}) {
+    for (const char* wrong :
+         {"--size 8x8", "--sky 1,1,1", "--max-spp 4", "-o out", "--renderers gather", "--quality draft"}) {
         EXPECT_EQ(code(std::string("a.exr b.exr ") + wrong), 64) << wrong;
     }
     EXPECT_FALSE(fs::exists(place.path("out"))) << "a failed run leaves nothing";

@@ -55,6 +55,7 @@ cli::ReportSeries series(const std::string& method, int resolution, int points, 
                          double variance) {
     cli::ReportSeries result;
     result.method = method;
+    result.renderer = "path";
     result.tracer = resolution ? "sdf" : "triangle";
     result.resolution = resolution;
     result.median_voxel = resolution ? 4.0 / resolution : 0.0;
