@@ -389,6 +389,9 @@ TEST_F(CompareScene, SetsTheGatherAgainstThePathTracer) {
         EXPECT_EQ(series.at("settings").at("renderer"), m < 2 ? "path" : "gather");
         EXPECT_EQ(series.at("settings").at("tracer"), m % 2 ? "sdf" : "triangle");
         ASSERT_EQ(series.at("points").size(), 3u);
+        EXPECT_GT(series.at("points").at(2).at("rays").get<double>(),
+                  2.5 * series.at("points").at(0).at("rays").get<double>())
+            << "a rung takes its samples or frames";
         std::set<std::string> stages;
         for (const json& stage : series.at("stages")) stages.insert(stage.at("name"));
         EXPECT_EQ(stages.count("trace_probes"), m < 2 ? 0u : 1u);
